@@ -1,7 +1,6 @@
 // Bytes of which most are 0.
 #pragma once
 #include <array>
-#include <bit>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
@@ -28,9 +27,11 @@ class SparseBytes {
     if (block_of_.back() == kZeros) {
       OSTEON_CHECK(values_.size() < kZeros);
       block_of_.back() = static_cast<std::uint32_t>(blocks_.size());
-      blocks_.push_back({{}, static_cast<std::uint32_t>(values_.size())});
+      blocks_.push_back({.bits = {}, .before = {}, .first = static_cast<std::uint32_t>(values_.size())});
     }
-    blocks_.back().bits[within / 64] |= std::uint64_t{1} << within % 64;
+    Block& block = blocks_.back();
+    block.bits[within / 64] |= std::uint64_t{1} << within % 64;
+    for (std::size_t word = within / 64 + 1; word < block.before.size(); ++word) ++block.before[word];
     values_.push_back(byte);
   }
 
@@ -38,27 +39,39 @@ class SparseBytes {
     const std::uint32_t number = block_of_[i / kBlockSize];
     if (number == kZeros) return 0;
     const Block& block = blocks_[number];
-    const std::size_t last = i % kBlockSize / 64;
+    const std::size_t word = i % kBlockSize / 64;
     const std::uint64_t bit = std::uint64_t{1} << i % 64;
-    if ((block.bits[last] & bit) == 0) return 0;
-    std::size_t value = block.first + static_cast<std::size_t>(std::popcount(block.bits[last] & (bit - 1)));
-    for (std::size_t word = 0; word < last; ++word) value += static_cast<std::size_t>(std::popcount(block.bits[word]));
-    return values_[value];
+    if ((block.bits[word] & bit) == 0) return 0;
+    return values_[block.first + block.before[word] + ones(block.bits[word] & (bit - 1))];
   }
   [[nodiscard]] std::size_t size() const { return size_; }
   [[nodiscard]] bool empty() const { return size_ == 0; }
   // Those that are not 0, in order.
   [[nodiscard]] std::span<const std::uint8_t> values() const { return values_; }
+  // All of them.
+  [[nodiscard]] std::vector<std::uint8_t> dense() const {
+    std::vector<std::uint8_t> bytes(size_);
+    for (std::size_t i = 0; i < size_; ++i) bytes[i] = (*this)[i];
+    return bytes;
+  }
 
   bool operator==(const SparseBytes& other) const = default;
 
  private:
+  // How many bits are 1. Without an option for newer processors, std::popcount() calls a library.
+  static constexpr std::size_t ones(std::uint64_t bits) {
+    bits -= bits >> 1 & 0x5555555555555555u;
+    bits = (bits & 0x3333333333333333u) + (bits >> 2 & 0x3333333333333333u);
+    return ((bits + (bits >> 4)) & 0x0f0f0f0f0f0f0f0fu) * 0x0101010101010101u >> 56;
+  }
+
   static constexpr std::size_t kBlockSize = 256;
   static constexpr std::uint32_t kZeros = std::numeric_limits<std::uint32_t>::max();
 
   struct Block {
-    std::array<std::uint64_t, kBlockSize / 64> bits;  // 1: the byte is not 0
-    std::uint32_t first;                              // of its values in values_
+    std::array<std::uint64_t, kBlockSize / 64> bits;   // 1: the byte is not 0
+    std::array<std::uint8_t, kBlockSize / 64> before;  // how many are not 0 in the words before
+    std::uint32_t first;                               // of its values in values_
 
     bool operator==(const Block& other) const = default;
   };

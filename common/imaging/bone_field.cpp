@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "common/imaging/calibration.hpp"
 
@@ -24,7 +23,7 @@ double crossing(double marrow_hu, double outside_hu) {
 
 }  // namespace
 
-BoneField::BoneField(const HuVolume& volume, const VoxelMask& bones, const SurfaceLevel& level)
+BoneField::BoneField(const HuVolume& volume, const SparseMask& bones, const SurfaceLevel& level)
     : volume_(volume),
       bones_(bones),
       level_(level),
@@ -32,7 +31,7 @@ BoneField::BoneField(const HuVolume& volume, const VoxelMask& bones, const Surfa
   for (std::size_t axis = 0; axis < 3; ++axis) bricks_[axis] = (volume.dims[axis] + kBrick - 1) / kBrick;
 }
 
-Result<BoneField> BoneField::make(const HuVolume& volume, const VoxelMask& bones, const SurfaceLevel& level,
+Result<BoneField> BoneField::make(const HuVolume& volume, const SparseMask& bones, const SurfaceLevel& level,
                                   const KeepGoing& keep_going) {
   BoneField field(volume, bones, level);
   const auto [columns, rows, slices] = volume.dims;
@@ -42,9 +41,10 @@ Result<BoneField> BoneField::make(const HuVolume& volume, const VoxelMask& bones
     if (!keep_going(static_cast<double>(slice) / slices)) return stopped_while("looking for the bone's surface");
     for (int row = 0; row < rows; ++row)
       for (int first = 0; first < columns; first += kBrick) {
-        const std::uint8_t* line = bones.values.data() + bones.index(first, row, slice);
+        const std::size_t voxel = volume.index(first, row, slice);
         const int count = std::min(kBrick, columns - first);
-        const auto kept = std::count_if(line, line + count, [](std::uint8_t bone) { return bone != 0; });
+        int kept = 0;
+        for (int i = 0; i < count; ++i) kept += bones.values[voxel + static_cast<std::size_t>(i)] != 0 ? 1 : 0;
         const std::size_t brick = places.index(first / kBrick, row / kBrick, slice / kBrick);
         any[brick] = any[brick] || kept > 0;
         all[brick] = all[brick] && kept == count;
@@ -75,10 +75,11 @@ Inside BoneField::inside(const VoxelBox& part) const {
   all = true;
   for (int slice = part.first[2]; slice <= part.last[2]; ++slice)
     for (int row = part.first[1]; row <= part.last[1]; ++row) {
-      const std::uint8_t* line = bones_.values.data() + bones_.index(part.first[0], row, slice);
+      const std::size_t voxel = volume_.index(part.first[0], row, slice);
       for (int i = 0; i < part.dim(0); ++i) {
-        any = any || line[i] != 0;
-        all = all && line[i] != 0;
+        const bool kept = bones_.values[voxel + static_cast<std::size_t>(i)] != 0;
+        any = any || kept;
+        all = all && kept;
       }
       if (any && !all) return Inside::some;
     }
@@ -102,7 +103,7 @@ std::int16_t BoneField::marrow_value(const std::array<int, 3>& at, std::size_t i
       ++neighbours;
     }
   const double above = neighbours > 0 ? std::max(1.0, sum / neighbours) : kInside_hu;
-  return static_cast<std::int16_t>(std::lround(std::min(32767.0, level_.threshold_hu + above)));
+  return nearest_hu(level_.threshold_hu + above);
 }
 
 // For a dense voxel beside dense bone that is kept: as far below the threshold as the mean of these is above it.
@@ -124,7 +125,7 @@ std::int16_t BoneField::outside_value(const std::array<int, 3>& at, std::size_t 
     }
   if (neighbours == 0) return below_;
   const double value = level_.threshold_hu - std::max(1.0, above / neighbours);
-  return static_cast<std::int16_t>(std::lround(std::max<double>(value, std::numeric_limits<std::int16_t>::min())));
+  return nearest_hu(value);
 }
 
 void BoneField::read(const VoxelBox& part, std::span<std::int16_t> values) const {

@@ -22,8 +22,8 @@ namespace osteon::imaging {
 class BoneField {
  public:
   // `bones`: not 0 for kept voxels. All three must outlive the field. Error: cancelled.
-  [[nodiscard]] static Result<BoneField> make(const HuVolume& volume, const VoxelMask& bones, const SurfaceLevel& level,
-                                              const KeepGoing& keep_going);
+  [[nodiscard]] static Result<BoneField> make(const HuVolume& volume, const SparseMask& bones,
+                                              const SurfaceLevel& level, const KeepGoing& keep_going);
 
   // Which voxels of a part are kept, and therefore at or above the threshold.
   [[nodiscard]] Inside inside(const VoxelBox& part) const;
@@ -31,12 +31,12 @@ class BoneField {
   void read(const VoxelBox& part, std::span<std::int16_t> values) const;
 
  private:
-  BoneField(const HuVolume& volume, const VoxelMask& bones, const SurfaceLevel& level);
+  BoneField(const HuVolume& volume, const SparseMask& bones, const SurfaceLevel& level);
   [[nodiscard]] std::int16_t marrow_value(const std::array<int, 3>& at, std::size_t i) const;
   [[nodiscard]] std::int16_t outside_value(const std::array<int, 3>& at, std::size_t i) const;
 
   const HuVolume& volume_;
-  const VoxelMask& bones_;
+  const SparseMask& bones_;
   const SurfaceLevel& level_;
   std::int16_t below_;           // the last whole HU below the threshold
   std::array<int, 3> bricks_{};  // along each axis

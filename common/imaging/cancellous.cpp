@@ -1,6 +1,7 @@
 #include "common/imaging/cancellous.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "common/imaging/components.hpp"
@@ -11,21 +12,22 @@ namespace {
 constexpr double kLeastBetween = 0.5;
 constexpr int kCorner = 8;  // voxels of a solid around one at its corner: 2³
 
+// The first whole number at or above a value.
+int whole_hu(double hu) { return static_cast<int>(std::ceil(hu)); }
+
 // Number of voxels at or above a value in a 3 x 3 square within the slice. Voxels beyond the volume do not count.
 void count_in_slice(const HuVolume& volume, double least_hu, int slice, std::vector<std::uint8_t>& row,
                     std::vector<std::uint8_t>& out) {
   const int columns = volume.dims[0], rows = volume.dims[1];
-  row.assign(out.size(), 0);
+  const int least = whole_hu(least_hu);
+  row.resize(out.size());
   std::ranges::fill(out, std::uint8_t{0});
+  std::vector<std::uint8_t> line(static_cast<std::size_t>(columns) + 2, 0);  // with a voxel beyond each end
   for (int y = 0; y < rows; ++y) {
     const std::int16_t* hu = volume.values.data() + volume.index(0, y, slice);
-    std::uint8_t* to = row.data() + static_cast<std::ptrdiff_t>(y) * columns;
-    for (int x = 0; x < columns; ++x) {
-      if (hu[x] < least_hu) continue;
-      ++to[x];
-      if (x > 0) ++to[x - 1];
-      if (x + 1 < columns) ++to[x + 1];
-    }
+    std::uint8_t *to = row.data() + static_cast<std::ptrdiff_t>(y) * columns, *counts = line.data();
+    for (int x = 0; x < columns; ++x) counts[x + 1] = hu[x] >= least ? 1 : 0;
+    for (int x = 0; x < columns; ++x) to[x] = static_cast<std::uint8_t>(counts[x] + counts[x + 1] + counts[x + 2]);
   }
   for (int y = 0; y < rows; ++y)
     for (int from = std::max(0, y - 1); from <= std::min(rows - 1, y + 1); ++from) {
@@ -68,16 +70,17 @@ Result<VoxelMask> candidates(const HuVolume& volume, const VoxelMask& dense, con
   VoxelMask out(volume.dims);
   const std::size_t area = static_cast<std::size_t>(volume.dims[0]) * static_cast<std::size_t>(volume.dims[1]);
   CountAround bright(volume, params.cancellous_hu), no_air(volume, params.air_hu);
+  const int cancellous_hu = whole_hu(params.cancellous_hu), air_hu = whole_hu(params.air_hu);
   for (int slice = 0; slice < volume.dims[2]; ++slice) {
     if (!keep_going(static_cast<double>(slice) / volume.dims[2])) return stopped_while("looking for cancellous bone");
     bright.go_to(slice);
     no_air.go_to(slice);
     const std::size_t begin = volume.index(0, 0, slice);
     for (std::size_t i = 0; i < area; ++i) {
-      const double hu = volume.values[begin + i];
-      if (dense.values[begin + i] != 0 || hu < params.air_hu) continue;
+      const int hu = volume.values[begin + i];
+      if (dense.values[begin + i] != 0 || hu < air_hu) continue;
       const int count = bright.around(i);
-      out.values[begin + i] = 2 * count > no_air.around(i) || (count >= kCorner && hu >= params.cancellous_hu) ? 1 : 0;
+      out.values[begin + i] = 2 * count > no_air.around(i) || (count >= kCorner && hu >= cancellous_hu) ? 1 : 0;
     }
   }
   return out;

@@ -12,7 +12,7 @@ constexpr auto kEnamel = static_cast<std::uint8_t>(Tissue::enamel);
 
 }  // namespace
 
-Result<HardTissue> find_hard_tissue(const HuVolume& volume, const VoxelMask& bones,
+Result<HardTissue> find_hard_tissue(const HuVolume& volume, const SparseMask& bones,
                                     const DensityCalibration& calibration, double metal_hu,
                                     const KeepGoing& keep_going) {
   const double compact_hu = hounsfield(calibration, kCompactBone_g_cm3);

@@ -15,7 +15,7 @@ struct HardTissue {
 // Voxels from `metal_hu` on are metal. Voxels that the calibration shows as denser than kCompactBone_g_cm3 are metal
 // too within two voxels of metal, because the scanner has blurred its edge. The rest of these is enamel, or mineral of
 // the same density. Errors: cancelled.
-[[nodiscard]] Result<HardTissue> find_hard_tissue(const HuVolume& volume, const VoxelMask& bones,
+[[nodiscard]] Result<HardTissue> find_hard_tissue(const HuVolume& volume, const SparseMask& bones,
                                                   const DensityCalibration& calibration, double metal_hu,
                                                   const KeepGoing& keep_going);
 

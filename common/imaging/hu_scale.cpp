@@ -122,8 +122,7 @@ Result<void> rescale_hu(HuVolume& volume, const HuScale& scale, const KeepGoing&
   for (int slice = 0; slice < volume.dims[2]; ++slice) {
     if (!keep_going(static_cast<double>(slice) / volume.dims[2])) return stopped_while("correcting the scale of HU");
     std::int16_t* hu = volume.values.data() + volume.index(0, 0, slice);
-    for (std::size_t i = 0; i < area; ++i)
-      hu[i] = static_cast<std::int16_t>(std::lround(std::clamp(scale.corrected(hu[i]), -32768.0, 32767.0)));
+    for (std::size_t i = 0; i < area; ++i) hu[i] = nearest_hu(scale.corrected(hu[i]));
   }
   return {};
 }

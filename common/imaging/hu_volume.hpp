@@ -1,8 +1,10 @@
 // A CT volume as it was scanned: Hounsfield units on the scanner's own grid.
 #pragma once
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -14,6 +16,12 @@ namespace osteon::imaging {
 
 // Voxels along an axis. A file that says more is damaged.
 inline constexpr int kLargestScanAxis = 1 << 14;
+
+// The nearest whole number of HU that a voxel can have. Not for NaN. A call of std::lround() takes much longer.
+[[nodiscard]] inline std::int16_t nearest_hu(double hu) {
+  constexpr double least = std::numeric_limits<std::int16_t>::min(), most = std::numeric_limits<std::int16_t>::max();
+  return static_cast<std::int16_t>(std::clamp(hu, least, most) + (hu < 0.0 ? -0.5 : 0.5));
+}
 
 struct HuVolume {
   std::array<int, 3> dims{};                                 // columns, rows, slices

@@ -125,7 +125,7 @@ SliceShapes::SliceShapes(const HuVolume& volume, BoneField field)
       unit_mm_(kFarthest_slices * volume.spacing_mm.z() / kUnits),
       distances_(volume.count()) {}
 
-Result<SliceShapes> SliceShapes::make(const HuVolume& volume, const VoxelMask& bones, const SurfaceLevel& level,
+Result<SliceShapes> SliceShapes::make(const HuVolume& volume, const SparseMask& bones, const SurfaceLevel& level,
                                       const KeepGoing& keep_going) {
   auto field = BoneField::make(volume, bones, level, part(keep_going, 0.0, 0.1));
   if (!field) return tl::unexpected(field.error());

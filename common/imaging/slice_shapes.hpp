@@ -20,7 +20,7 @@ namespace osteon::imaging {
 class SliceShapes {
  public:
   // As BoneField::make(), whose arguments these are. Error: cancelled.
-  [[nodiscard]] static Result<SliceShapes> make(const HuVolume& volume, const VoxelMask& bones,
+  [[nodiscard]] static Result<SliceShapes> make(const HuVolume& volume, const SparseMask& bones,
                                                 const SurfaceLevel& level, const KeepGoing& keep_going);
 
   // Which samples of a box may be inside.

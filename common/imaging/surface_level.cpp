@@ -67,9 +67,10 @@ class Profiles {
     }
     return gradient;
   }
+  // Of a place in the scan, so without negative numbers.
   [[nodiscard]] std::size_t nearest(const Vec3& voxel) const {
-    return volume_.index(static_cast<int>(std::lround(voxel.x())), static_cast<int>(std::lround(voxel.y())),
-                         static_cast<int>(std::lround(voxel.z())));
+    return volume_.index(static_cast<int>(voxel.x() + 0.5), static_cast<int>(voxel.y() + 0.5),
+                         static_cast<int>(voxel.z() + 0.5));
   }
   // Trilinear HU, at most those of compact bone; nothing outside the scan.
   [[nodiscard]] std::optional<double> sample(const Vec3& voxel) const {

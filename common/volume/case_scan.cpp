@@ -203,7 +203,9 @@ Result<CaseScan> read_scan_file(const std::filesystem::path& file, const ScanGeo
   in.open(false);  // no delayed loading, because the file may be replaced while the program runs
   read_grid(in, kHuGrid, geometry, scan.hu);
   if (stopped(0.4)) return stopped_while("reading " + file.string());
-  read_grid(in, kLabelGrid, geometry, scan.labels);
+  std::vector<std::uint8_t> labels;
+  read_grid(in, kLabelGrid, geometry, labels);
+  scan.labels = SparseBytes(labels);
   if (stopped(0.6)) return stopped_while("reading " + file.string());
   std::vector<std::uint8_t> tissue;
   read_grid(in, kTissueGrid, geometry, tissue);
@@ -232,7 +234,7 @@ Result<ScanInfo> describe_scan(const CaseScan& scan, const KeepGoing& keep_going
 }
 
 Result<void> check_labels_of(const CaseScan& scan, const CaseInfo& info) {
-  if (Result<void> known = check_values(scan.labels, info.labels, "labels"); !known) return known;
+  if (Result<void> known = check_values(scan.labels.values(), info.labels, "labels"); !known) return known;
   return check_values(scan.tissue.values(), info.tissues, "tissues");
 }
 

@@ -20,8 +20,8 @@ class Case;
 struct CaseScan {
   ScanGeometry geometry;
   std::vector<std::int16_t> hu = {};
-  std::vector<std::uint8_t> labels = {};  // which structure the voxel belongs to; 0: none
-  SparseBytes tissue = {};                // what it is made of; 0: not known
+  SparseBytes labels = {};  // which structure the voxel belongs to; 0: none
+  SparseBytes tissue = {};  // what it is made of; 0: not known
 };
 
 inline constexpr const char* kScanFile = "scan.vdb";  // in the folder of the case

@@ -18,7 +18,8 @@
 #include "common/core/check.hpp"
 #include "common/core/mutex.hpp"
 #include "common/core/thread_annotations.hpp"
-#include "common/geometry/triangle_distance4.hpp"
+#include "common/geometry/triangle_distance.hpp"
+#include "common/geometry/triangle_distances.hpp"
 
 // The surface is meshed by dual contouring in its simplest form. Every cell with a crossing has one point, the mean of
 // the crossings on its edges. Every crossed lattice edge has a quad between the points of the four cells around it
@@ -342,19 +343,19 @@ class Slab {
     return distance_to_triangle<float>(p, points_[at(t[0])], points_[at(t[1])], points_[at(t[2])]);
   }
 
-  // Up to four triangles, each offered to a sample.
+  // Up to eight triangles, each offered to a sample.
   struct Offers {
     std::size_t count = 0;
-    std::array<std::int32_t, 4> triangles, samples;
-    std::array<Vec3f, 4> positions;  // of the samples
+    std::array<std::int32_t, Points8::kCount> triangles{}, samples{};
+    Points8 positions;  // of the samples
   };
 
-  // Offers a triangle to a sample, which stores the nearest one. Four offers are worked out at once.
+  // Offers a triangle to a sample, which stores the nearest one. Eight offers are worked out at once.
   void offer(std::int32_t triangle, std::int32_t sample, const Vec3f& p) {
     const std::size_t n = offers_.count++;
     offers_.triangles[n] = triangle;
     offers_.samples[n] = sample;
-    offers_.positions[n] = p;
+    offers_.positions.set(n, p);
     if (offers_.count == offers_.triangles.size()) take_offers();
   }
 
@@ -362,21 +363,16 @@ class Slab {
     const std::size_t count = offers_.count;
     if (count == 0) return;
     offers_.count = 0;
-    const std::array<std::int32_t, 4>& ids = offers_.triangles;
-    const auto lane = [&](std::size_t n) { return n < count ? n : 0; };
-    const auto corners = [&](std::size_t c) {
-      const auto point = [&](std::size_t n) -> const Vec3f& { return points_[at(triangles_[at(ids[lane(n)])][c])]; };
-      return Points4(point(0), point(1), point(2), point(3));
-    };
-    const std::array<Vec3f, 4>& p = offers_.positions;
-    const std::array<float, 4> squared = squared_distances_to_triangles(
-        Points4(p[0], p[lane(1)], p[lane(2)], p[lane(3)]), corners(0), corners(1), corners(2));
+    std::array<Points8, 3> corners;  // lanes without an offer keep what they had
+    for (std::size_t n = 0; n < count; ++n)
+      for (std::size_t c = 0; c < 3; ++c) corners[c].set(n, points_[at(triangles_[at(offers_.triangles[n])][c])]);
+    const auto squared = squared_distances_to_triangles(offers_.positions, corners[0], corners[1], corners[2]);
     for (std::size_t n = 0; n < count; ++n) {
       float& best = squared_[at(offers_.samples[n])];
       std::int32_t& nearest = nearest_[at(offers_.samples[n])];
       if (nearest != kNone && !(squared[n] < best)) continue;
       best = squared[n];
-      nearest = ids[n];
+      nearest = offers_.triangles[n];
     }
   }
 

@@ -103,7 +103,7 @@ Result<CoordBox> lattice_around(const imaging::HuVolume& volume, const std::arra
   return lattice;
 }
 
-Result<SparseVolume> measure_surface(const imaging::HuVolume& volume, const imaging::VoxelMask& bones,
+Result<SparseVolume> measure_surface(const imaging::HuVolume& volume, const imaging::SparseMask& bones,
                                      const imaging::SurfaceLevel& level, const CoordBox& lattice, double pitch_mm,
                                      const KeepGoing& keep_going) {
   const auto field = imaging::BoneField::make(volume, bones, level, part(keep_going, 0.0, 0.02));
@@ -121,7 +121,7 @@ Result<SparseVolume> measure_surface(const imaging::HuVolume& volume, const imag
   return narrow_band_mm(samples, static_cast<float>(level.threshold_hu), pitch_mm, part(keep_going, 0.02, 1.0));
 }
 
-Result<SparseVolume> measure_shapes(const imaging::HuVolume& volume, const imaging::VoxelMask& bones,
+Result<SparseVolume> measure_shapes(const imaging::HuVolume& volume, const imaging::SparseMask& bones,
                                     const imaging::SurfaceLevel& level, const CoordBox& lattice, double pitch_mm,
                                     const KeepGoing& keep_going) {
   const auto shapes = imaging::SliceShapes::make(volume, bones, level, part(keep_going, 0.0, 0.2));

@@ -48,12 +48,12 @@ struct ScanRegion {
 
 // The signed distance to the bones in the narrow band around their surface, see imaging::BoneField. Errors: cancelled,
 // internal.
-[[nodiscard]] Result<SparseVolume> measure_surface(const imaging::HuVolume& volume, const imaging::VoxelMask& bones,
+[[nodiscard]] Result<SparseVolume> measure_surface(const imaging::HuVolume& volume, const imaging::SparseMask& bones,
                                                    const imaging::SurfaceLevel& level, const CoordBox& lattice,
                                                    double pitch_mm, const KeepGoing& keep_going);
 
 // The same with the surface between slices by imaging::SliceShapes.
-[[nodiscard]] Result<SparseVolume> measure_shapes(const imaging::HuVolume& volume, const imaging::VoxelMask& bones,
+[[nodiscard]] Result<SparseVolume> measure_shapes(const imaging::HuVolume& volume, const imaging::SparseMask& bones,
                                                   const imaging::SurfaceLevel& level, const CoordBox& lattice,
                                                   double pitch_mm, const KeepGoing& keep_going);
 

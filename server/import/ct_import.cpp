@@ -355,11 +355,15 @@ Result<CtImport> import_bones(CtScan scan, CtOptions options, const KeepGoing& k
   give_back_freed_memory();
   const auto lattice = lattice_around(s->volume, s->first, s->last, pitch_mm);
   if (!lattice) return tl::unexpected(lattice.error());
+  // From here on nothing changes them. Dense, they would take half the memory of the scan.
+  imaging::SparseMask bones(s->bones);
+  s->bones = {};
+  give_back_freed_memory();
   const bool shapes = options.between_slices == BetweenSlices::shapes ||
                       (options.between_slices == BetweenSlices::automatic && imaging::has_thick_slices(geometry));
   if (options.surface == SurfaceAt::threshold) scan.source += ", surface at the threshold";
   if (shapes) scan.source += ", shapes interpolated between slices";
-  auto surface_mm = (shapes ? measure_shapes : measure_surface)(s->volume, s->bones, s->level, *lattice, pitch_mm,
+  auto surface_mm = (shapes ? measure_shapes : measure_surface)(s->volume, bones, s->level, *lattice, pitch_mm,
                                                                 part(keep_going, kSegmentEnd, kSurfaceEnd));
   if (!surface_mm) return tl::unexpected(surface_mm.error());
   s->level = {};
@@ -372,8 +376,7 @@ Result<CtImport> import_bones(CtScan scan, CtOptions options, const KeepGoing& k
     change_hu = std::move(*change);
   }
   const KeepGoing building = part(keep_going, kCortexEnd, 1.0);
-  auto hard =
-      imaging::find_hard_tissue(s->volume, s->bones, calibrated->line, options.metal_hu, part(building, 0.0, 0.2));
+  auto hard = imaging::find_hard_tissue(s->volume, bones, calibrated->line, options.metal_hu, part(building, 0.0, 0.2));
   if (!hard) return tl::unexpected(hard.error());
   s->found.metal_cm3 = hard->metal_cm3;
   s->found.enamel_cm3 = hard->enamel_cm3;
@@ -384,7 +387,7 @@ Result<CtImport> import_bones(CtScan scan, CtOptions options, const KeepGoing& k
   auto made = make_case(
       {.scan = geometry,
        .volume = std::move(s->volume),
-       .known = {std::move(s->bones), std::move(hard->tissue), ~std::bitset<256>(1)},
+       .known = {std::move(bones), std::move(hard->tissue), ~std::bitset<256>(1)},
        .tissue_labels = {},
        .keep = keep,
        .several = s->found.bones.empty() ? s->found.kept.size() > 1 && !options.merge

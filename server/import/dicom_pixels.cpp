@@ -11,6 +11,7 @@
 #include <new>
 #include <vector>
 
+#include "common/imaging/hu_volume.hpp"
 #include "server/import/series_report.hpp"
 
 namespace osteon::import {
@@ -106,8 +107,7 @@ Result<void> PixelReader::read(const DicomHeader& h, const fs::path& file, const
     const int stored =
         is_signed_ ? static_cast<std::int16_t>(static_cast<std::uint16_t>(raw << unused_)) >> unused_ : raw;
     const double hu = stored * h.slope[0] + h.intercept[0];
-    out[i] = has_padding && raw == padding ? kPadding_hu
-                                           : static_cast<std::int16_t>(std::lround(std::clamp(hu, -32768.0, 32767.0)));
+    out[i] = has_padding && raw == padding ? kPadding_hu : imaging::nearest_hu(hu);
   }
   return {};
 } catch (const std::bad_alloc&) {

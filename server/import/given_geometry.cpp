@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <string>
 
 #include "common/core/read_number.hpp"
@@ -52,9 +51,7 @@ Result<Eigen::Matrix3d> parse_axes(std::string_view text) {
 }
 
 std::int16_t hu_of(double stored, const GivenGeometry& given) {
-  constexpr double least = std::numeric_limits<std::int16_t>::min(), most = std::numeric_limits<std::int16_t>::max();
-  const double hu = given.slope * stored + given.intercept;
-  return static_cast<std::int16_t>(std::lround(std::clamp(hu, least, most)));
+  return imaging::nearest_hu(given.slope * stored + given.intercept);
 }
 
 imaging::HuVolume volume_of(const std::array<int, 3>& dims, const GivenGeometry& given) {

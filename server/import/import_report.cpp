@@ -1,6 +1,8 @@
 #include "server/import/import_report.hpp"
 
+#include <cstdint>
 #include <new>
+#include <vector>
 
 #include "common/runtime/files.hpp"
 #include "server/import/ct_case.hpp"
@@ -14,11 +16,11 @@ namespace {
 namespace fs = std::filesystem;
 
 // Draws the labels of a case one by one, where the import did not do it.
-Result<void> draw_parts(const CaseScan& scan, ReportFacts& facts, const KeepGoing& keep_going) {
+Result<void> draw_parts(const LabelledVoxels& voxels, ReportFacts& facts, const KeepGoing& keep_going) {
   std::size_t drawn = 0;
   for (ReportPart& part : facts.parts) {
     if (!part.kept || part.picture.width() > 0 || ++drawn > kMostIslandsDrawn) continue;
-    auto picture = label_picture(scan, part.number, part.colour.value_or(kGreyInk), keep_going);
+    auto picture = label_picture(voxels, part.number, part.colour.value_or(kGreyInk), keep_going);
     if (!picture) return tl::unexpected(picture.error());
     part.picture = std::move(*picture);
   }
@@ -37,13 +39,15 @@ Result<void> write_files(const ImportReport& report, const fs::path& folder, con
   if (!facts) return tl::unexpected(facts.error());
   ReportImages images;
   if (report.bone) {
-    const auto picture = montage(*report.scan, report.bone->info().labels, *facts, part(keep_going, 0.2, 0.8));
+    const std::vector<std::uint8_t> labels = report.scan->labels.dense();
+    const LabelledVoxels voxels{report.scan->geometry, report.scan->hu, labels};
+    const auto picture = montage(voxels, report.bone->info().labels, *facts, part(keep_going, 0.2, 0.8));
     if (!picture) return tl::unexpected(picture.error());
     auto png = written_png(*picture, folder / "montage.png");
     if (!png) return tl::unexpected(png.error());
     images.montage = std::move(*png);
     if (!report.islands || report.labels)
-      if (auto drawn = draw_parts(*report.scan, *facts, part(keep_going, 0.8, 1.0)); !drawn) return drawn;
+      if (auto drawn = draw_parts(voxels, *facts, part(keep_going, 0.8, 1.0)); !drawn) return drawn;
   }
   if (report.islands && report.islands->views.overview.width() > 0) {
     auto png = written_png(report.islands->views.overview, folder / "islands.png");

@@ -128,25 +128,21 @@ Result<CaseScan> kept_scan(imaging::HuVolume volume, KnownVoxels known, const im
   for (std::size_t axis = 0; axis < 3; ++axis) scan.geometry.dims[axis] = box.dim(axis);
   scan.geometry.origin_mm = volume.position_mm(Vec3(box.first[0], box.first[1], box.first[2]));
   scan.geometry.axes_mm = volume.directions * volume.spacing_mm.asDiagonal();
-  auto hu = imaging::cropped(std::move(volume), box.first, box.last, part(keep_going, 0.0, 0.3));
+  auto hu = imaging::cropped(std::move(volume), box.first, box.last, part(keep_going, 0.0, 0.4));
   if (!hu) return tl::unexpected(hu.error());
   scan.hu = std::move(hu->values);
-  auto labels = imaging::cropped(std::move(known.labels), box.first, box.last, part(keep_going, 0.3, 0.5));
-  if (!labels) return tl::unexpected(labels.error());
-  scan.labels = std::move(labels->values);
-  std::vector<std::uint8_t> tissue;
-  if (!known.tissue.values.empty()) {
-    auto cropped = imaging::cropped(std::move(known.tissue), box.first, box.last, part(keep_going, 0.5, 0.7));
-    if (!cropped) return tl::unexpected(cropped.error());
-    tissue = std::move(cropped->values);
-  }
-  const std::size_t area = box.count() / static_cast<std::size_t>(box.dim(2));
-  for (std::size_t i = 0; i < scan.labels.size(); ++i) {
-    if (i % area == 0 && !keep_going(0.7 + 0.3 * static_cast<double>(i) / static_cast<double>(scan.labels.size())))
-      return stopped_while("taking the tissues");
-    const bool is_bone = known.bone_labels[scan.labels[i]];
-    const std::uint8_t hard = tissue.empty() ? std::uint8_t{0} : tissue[i];
-    scan.tissue.push_back(!is_bone ? std::uint8_t{0} : hard != 0 ? hard : tissue_of(calibration, scan.hu[i]));
+  std::size_t to = 0;
+  for (int slice = box.first[2]; slice <= box.last[2]; ++slice) {
+    if (!keep_going(0.4 + 0.6 * (slice - box.first[2]) / box.dim(2))) return stopped_while("taking labels and tissues");
+    for (int row = box.first[1]; row <= box.last[1]; ++row)
+      for (int column = box.first[0]; column <= box.last[0]; ++column, ++to) {
+        const std::uint8_t label = known.labels.at(column, row, slice);
+        const std::uint8_t hard = known.tissue.values.empty() ? std::uint8_t{0} : known.tissue.at(column, row, slice);
+        scan.labels.push_back(label);
+        scan.tissue.push_back(!known.bone_labels[label] ? std::uint8_t{0}
+                              : hard != 0               ? hard
+                                                        : tissue_of(calibration, scan.hu[to]));
+      }
   }
   return scan;
 }
@@ -180,7 +176,6 @@ Result<CaseScan> kept_scan(const imaging::LabelVolume& volume, const KeepGoing& 
   scan.geometry.dims = {box.dims().x, box.dims().y, box.dims().z};
   scan.geometry.origin_mm = position_mm(box.min, 1.0).cwiseProduct(volume.spacing_mm);
   scan.geometry.axes_mm = volume.spacing_mm.asDiagonal();
-  scan.labels.reserve(scan.geometry.count());
   for (int z = box.min.z; z <= box.max.z; ++z) {
     if (!keep_going(static_cast<double>(z - box.min.z) / box.dims().z)) return stopped_while("taking the labels");
     for (int y = box.min.y; y <= box.max.y; ++y)

@@ -19,7 +19,7 @@ namespace osteon::import {
 
 // What is known of each voxel of a volume.
 struct KnownVoxels {
-  imaging::VoxelMask labels;     // what it belongs to; 0: nothing
+  imaging::SparseMask labels;    // what it belongs to; 0: nothing
   imaging::VoxelMask tissue;     // a value of Tissue, for bone; 0: by its density. Empty: all by their density
   std::bitset<256> bone_labels;  // which labels are bone; not 0
 };

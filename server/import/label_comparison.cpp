@@ -236,7 +236,8 @@ Result<LabelComparison> compare_labels(const CaseScan& scan, const std::vector<C
     case_box.first[axis] = static_cast<int>(std::lround(first[static_cast<int>(axis)]));
     case_box.last[axis] = case_box.first[axis] + scan.geometry.dims[axis] - 1;
   }
-  const Labelled ours{case_box, scan.labels}, theirs{truth.box, truth.values};
+  const std::vector<std::uint8_t> values = scan.labels.dense();
+  const Labelled ours{case_box, values}, theirs{truth.box, truth.values};
 
   LabelComparison comparison;
   const auto compare = [&](ComparedLabel row, const std::bitset<256>& of, const std::bitset<256>& of_truth,

@@ -143,8 +143,8 @@ Result<void> write_labels(const CaseScan& scan, const std::vector<CaseLabel>& la
     fs::remove(partial, error);
     return stopped_while("writing " + file.string());
   }
-  Result<void> written =
-      write_label_volume(partial, format, *header, scan.labels, names ? slicer_fields(scan, labels) : HeaderFields{});
+  Result<void> written = write_label_volume(partial, format, *header, scan.labels.dense(),
+                                            names ? slicer_fields(scan, labels) : HeaderFields{});
   // The libraries do not notice a full disk.
   if (written && !check_voxels(partial, format, scan.labels.size(), 1)) written = failure(ErrorCode::internal, "");
   if (!written) written = failure(ErrorCode::internal, "cannot write " + file.string() + "; is the disk full?");

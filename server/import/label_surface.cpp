@@ -51,7 +51,7 @@ CoordBox within(const CoordBox& box, Coord origin) {
 
 }  // namespace
 
-Result<LabelField> label_field(const imaging::VoxelMask& bones, const imaging::HuVolume& grid,
+Result<LabelField> label_field(const imaging::SparseMask& bones, const imaging::HuVolume& grid,
                                const std::array<int, 3>& first, const std::array<int, 3>& last,
                                const KeepGoing& keep_going) {
   std::array<int, 3> low{}, high{}, dims{};
@@ -61,16 +61,18 @@ Result<LabelField> label_field(const imaging::VoxelMask& bones, const imaging::H
     dims[axis] = high[axis] - low[axis] + 1;
   }
   LabelField made;
-  made.bones = imaging::VoxelMask(dims);
+  made.bones.dims = dims;
   imaging::LabelVolume labels;
   labels.dims = bones.dims;
   labels.spacing_mm = grid.spacing_mm;
   labels.labels = DenseVolume<std::uint8_t>({{low[0], low[1], low[2]}, {high[0], high[1], high[2]}}, 0);
-  std::uint8_t* bone = made.bones.values.data();
   for (int slice = low[2]; slice <= high[2]; ++slice)
     for (int row = low[1]; row <= high[1]; ++row)
-      for (int column = low[0]; column <= high[0]; ++column)
-        *bone++ = labels.labels.at({column, row, slice}) = bones.at(column, row, slice);
+      for (int column = low[0]; column <= high[0]; ++column) {
+        const std::uint8_t bone = bones.at(column, row, slice);
+        labels.labels.at({column, row, slice}) = bone;
+        made.bones.values.push_back(bone);
+      }
   const auto smooth = imaging::smooth_labels(labels, {}, keep_going);
   if (!smooth) return tl::unexpected(smooth.error());
 

@@ -12,12 +12,12 @@ namespace osteon::import {
 // A field that is above 0 in the voxels of `bones` that are not 0 and below elsewhere. Both have the same voxels.
 struct LabelField {
   imaging::HuVolume field;
-  imaging::VoxelMask bones;
+  imaging::SparseMask bones;
 };
 
 // The field as imaging::smooth_labels() makes it, over the scan's voxels from `first` to `last` and a few around them.
 // `grid`: where the voxels of `bones` lie. Error: cancelled.
-[[nodiscard]] Result<LabelField> label_field(const imaging::VoxelMask& bones, const imaging::HuVolume& grid,
+[[nodiscard]] Result<LabelField> label_field(const imaging::SparseMask& bones, const imaging::HuVolume& grid,
                                              const std::array<int, 3>& first, const std::array<int, 3>& last,
                                              const KeepGoing& keep_going);
 

@@ -19,8 +19,8 @@ namespace {
 // The part of the scan with the labels of a map.
 struct Labelled {
   imaging::HuVolume volume;
-  imaging::VoxelMask labels;  // of the part's voxels
-  imaging::VoxelMask bones;   // only those that are bone
+  imaging::SparseMask labels;  // of the part's voxels
+  imaging::SparseMask bones;   // only those that are bone
   std::bitset<256> bone_labels;
   std::array<int, 3> first{}, last{};                // voxel box of the bones
   std::array<int, 3> labels_first{}, labels_last{};  // of all labels
@@ -57,9 +57,9 @@ Result<Labelled> take_labels(imaging::HuVolume scan, PlacedLabels& placed, const
   found.volume = std::move(*volume);
   auto labels = imaging::cropped(std::move(placed.values), work.first, work.last, part(keep_going, 0.8, 1.0));
   if (!labels) return tl::unexpected(labels.error());
-  found.labels = std::move(*labels);
-  found.bones = found.labels;
-  for (std::uint8_t& value : found.bones.values) value = found.bone_labels[value] ? value : std::uint8_t{0};
+  found.labels = imaging::SparseMask(*labels);
+  for (std::uint8_t& value : labels->values) value = found.bone_labels[value] ? value : std::uint8_t{0};
+  found.bones = imaging::SparseMask(*labels);
   for (std::size_t axis = 0; axis < 3; ++axis)
     for (std::array<int, 3>* end : {&found.first, &found.last, &found.labels_first, &found.labels_last})
       (*end)[axis] -= work.first[axis];
@@ -79,15 +79,17 @@ std::array<Tissue, 256> said_tissues(const PlacedLabels& placed) {
 }
 
 // Writes the tissues that labels say over those of the HU. Gives these labels.
-std::bitset<256> take_tissues(const PlacedLabels& placed, const imaging::VoxelMask& labels,
+std::bitset<256> take_tissues(const PlacedLabels& placed, const imaging::SparseMask& labels,
                               imaging::VoxelMask& tissue) {
   const std::array<Tissue, 256> said = said_tissues(placed);
   std::bitset<256> saying;
   for (std::size_t label = 0; label < said.size(); ++label) saying[label] = said[label] != Tissue::none;
   if (saying.none()) return saying;
   if (tissue.values.empty()) tissue = imaging::VoxelMask(labels.dims);
-  for (std::size_t i = 0; i < labels.values.size(); ++i)
-    if (saying[labels.values[i]]) tissue.values[i] = static_cast<std::uint8_t>(said[labels.values[i]]);
+  for (std::size_t i = 0; i < labels.values.size(); ++i) {
+    const std::uint8_t label = labels.values[i];
+    if (saying[label]) tissue.values[i] = static_cast<std::uint8_t>(said[label]);
+  }
   return saying;
 }
 
@@ -102,7 +104,7 @@ Result<SparseVolume> measure_labels(const Labelled& found, const imaging::HuVolu
   // The volume is that of the bone within the scan.
   if (auto capped = cap_at_scan(geometry, pitch_mm, *surface_mm, part(keep_going, 0.9, 1.0)); !capped)
     return tl::unexpected(capped.error());
-  const auto voxels = std::ranges::count_if(field->bones.values, [](std::uint8_t value) { return value != 0; });
+  const std::size_t voxels = field->bones.values.values().size();
   restore_volume(static_cast<double>(voxels) * geometry.spacing_mm.prod(), pitch_mm, lattice, *surface_mm);
   return surface_mm;
 }

@@ -68,10 +68,9 @@ Picture list_of_parts(const ReportFacts& facts) {
 
 }  // namespace
 
-Result<Picture> montage(const CaseScan& scan, const std::vector<CaseLabel>& labels, const ReportFacts& facts,
+Result<Picture> montage(const LabelledVoxels& voxels, const std::vector<CaseLabel>& labels, const ReportFacts& facts,
                         const KeepGoing& keep_going) {
   const Colours colours = colours_of(labels);
-  const LabelledVoxels voxels{scan.geometry, scan.hu, scan.labels};
   const bool any_bone = std::ranges::any_of(colours.bones, [](const auto& colour) { return colour.has_value(); });
   const LabelColours& main = any_bone ? colours.bones : colours.all;
   const Box box = coloured_box(voxels, colours.all);
@@ -107,10 +106,9 @@ Result<Picture> montage(const CaseScan& scan, const std::vector<CaseLabel>& labe
   return whole;
 }
 
-Result<Picture> label_picture(const CaseScan& scan, int label, Colour colour, const KeepGoing& keep_going) {
+Result<Picture> label_picture(const LabelledVoxels& voxels, int label, Colour colour, const KeepGoing& keep_going) {
   LabelColours one;
   one[static_cast<std::size_t>(label)] = colour;
-  const LabelledVoxels voxels{scan.geometry, {}, scan.labels};
   const Box box = coloured_box(voxels, one);
   if (box.empty()) return Picture(kLabelPixels, kLabelPixels, kBlackInk);
   auto drawn = draw_surface(voxels, one, {}, frame_around(box, View::coronal, kLabelPixels, 6), keep_going);

@@ -10,12 +10,12 @@
 #include <cmath>
 #include <cstdio>
 #include <cstring>
-#include <limits>
 #include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "common/imaging/hu_volume.hpp"
 #include "server/import/series_report.hpp"
 
 namespace osteon::import {
@@ -45,9 +45,8 @@ itk::ImageIOBase::Pointer reader_of(const fs::path& file, VolumeFormat format) {
 
 // Null for a number that is not finite.
 std::optional<std::int16_t> to_hu(double value) {
-  constexpr double least = std::numeric_limits<std::int16_t>::min(), most = std::numeric_limits<std::int16_t>::max();
   if (!std::isfinite(value)) return std::nullopt;
-  return static_cast<std::int16_t>(std::lround(std::clamp(value, least, most)));
+  return imaging::nearest_hu(value);
 }
 
 template <class T>

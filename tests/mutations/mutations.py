@@ -104,7 +104,7 @@ MUTATIONS = [
       "the band of distances is a voxel too narrow", "unit.volume", "NarrowBand.*"),
     M("common/volume/narrow_band.cpp", "inside_[at(n)] = found == Inside::all;", "inside_[at(n)] = false;",
       "the inside of a bone is outside beyond the band", "unit.volume", "NarrowBand.*"),
-    M("common/geometry/triangle_distance4.hpp", "choose(rest, vb, zero)", "choose(rest, vc, zero)",
+    M("common/geometry/triangle_distances.cpp", "(rest ? vb : zero)", "(rest ? vc : zero)",
       "the nearest point of a face is a wrong one", "unit.geometry", "TriangleDistance.*"),
     M("common/imaging/calibration_line.cpp", "away * away / squares", "away / squares",
       "the error of the density is too small far from the rods", "unit.imaging", "CalibrationLine.*"),

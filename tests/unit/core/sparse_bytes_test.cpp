@@ -23,6 +23,7 @@ TEST(SparseBytes, GivesTheBytesBack) {
       EXPECT_EQ(sparse.empty(), size == 0);
       for (std::size_t i = 0; i < size; ++i) ASSERT_EQ(sparse[i], bytes[i]) << i << " of " << size;
       EXPECT_TRUE(std::ranges::equal(sparse.values(), values));
+      EXPECT_EQ(sparse.dense(), bytes);
     }
 }
 

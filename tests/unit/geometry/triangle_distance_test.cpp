@@ -1,4 +1,4 @@
-#include "common/geometry/triangle_distance4.hpp"
+#include "common/geometry/triangle_distances.hpp"
 
 #include <gtest/gtest.h>
 
@@ -68,7 +68,7 @@ TEST(TriangleDistance, IsFiniteAndRightWithoutArea) {
 }
 
 // Places on a coarse grid, so that many triangles have no area, right angles, or the point on a side.
-TEST(TriangleDistance, OfFourAtOnceHasTheSameBytes) {
+TEST(TriangleDistance, OfEightAtOnceHasTheSameBytes) {
   std::mt19937 random(3);
   std::uniform_int_distribution<int> step(-2, 2);
   std::uniform_real_distribution<float> jitter(-0.3f, 0.3f);
@@ -77,12 +77,16 @@ TEST(TriangleDistance, OfFourAtOnceHasTheSameBytes) {
       const Eigen::Vector3f place = Eigen::Vector3i(step(random), step(random), step(random)).cast<float>();
       return i % 2 == 0 ? place : Eigen::Vector3f(place + Eigen::Vector3f(jitter(random), jitter(random), 0.0f));
     };
-    std::array<std::array<Eigen::Vector3f, 4>, 4> of;  // p, a, b, c of each lane
+    std::array<std::array<Eigen::Vector3f, 8>, 4> of;  // p, a, b, c of each lane
     for (auto& corners : of)
       for (Eigen::Vector3f& lane : corners) lane = point();
-    const auto all = [&](std::size_t n) { return Points4(of[n][0], of[n][1], of[n][2], of[n][3]); };
+    const auto all = [&](std::size_t n) {
+      Points8 points;
+      for (std::size_t lane = 0; lane < 8; ++lane) points.set(lane, of[n][lane]);
+      return points;
+    };
     const auto found = squared_distances_to_triangles(all(0), all(1), all(2), all(3));
-    for (std::size_t lane = 0; lane < 4; ++lane)
+    for (std::size_t lane = 0; lane < 8; ++lane)
       ASSERT_EQ(found[lane], distance_to_triangle<float>(of[0][lane], of[1][lane], of[2][lane], of[3][lane]).squared)
           << "trial " << i << ", lane " << lane;
   }

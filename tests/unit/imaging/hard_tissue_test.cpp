@@ -23,7 +23,7 @@ Scene block(std::int16_t hu) {
 }
 
 HardTissue hard_tissue(const Scene& s, double metal_hu = kMetal_hu) {
-  auto found = find_hard_tissue(s.volume, s.bones, kRho1995, metal_hu, always);
+  auto found = find_hard_tissue(s.volume, SparseMask(s.bones), kRho1995, metal_hu, always);
   EXPECT_TRUE(found);
   return std::move(*found);
 }

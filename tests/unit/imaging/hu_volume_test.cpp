@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 namespace osteon::imaging {
 namespace {
 
@@ -78,6 +80,19 @@ TEST(HuVolume, CroppingCanBeStoppedBeforeEachSlice) {
     ASSERT_FALSE(part) << stop;
     EXPECT_EQ(part.error().code, ErrorCode::cancelled);
   }
+}
+
+TEST(HuVolume, NearestHuRoundsHalvesAwayFromZero) {
+  for (int hu = -40000; hu <= 40000; hu += 7) {
+    const auto within = static_cast<std::int16_t>(std::clamp(hu, -32768, 32767));
+    EXPECT_EQ(nearest_hu(hu), within);
+    if (within != hu || within == -32768 || within == 32767) continue;
+    for (const double part : {-0.49, -0.25, 0.25, 0.49}) EXPECT_EQ(nearest_hu(hu + part), hu) << hu << " " << part;
+    EXPECT_EQ(nearest_hu(hu + 0.5), hu >= 0 ? hu + 1 : hu);
+    EXPECT_EQ(nearest_hu(hu - 0.5), hu <= 0 ? hu - 1 : hu);
+  }
+  EXPECT_EQ(nearest_hu(1e300), 32767);
+  EXPECT_EQ(nearest_hu(-1e300), -32768);
 }
 
 }  // namespace

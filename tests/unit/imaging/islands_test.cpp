@@ -125,7 +125,8 @@ HuVolume field_of(const HuVolume& volume, const VoxelMask& bones) {
   HuVolume field = volume;
   const VoxelBox whole{{0, 0, 0}, {volume.dims[0] - 1, volume.dims[1] - 1, volume.dims[2] - 1}};
   const SurfaceLevel level{kThreshold_hu};
-  BoneField::make(volume, bones, level, always)->read(whole, field.values);
+  const SparseMask kept(bones);
+  BoneField::make(volume, kept, level, always)->read(whole, field.values);
   return field;
 }
 
@@ -186,7 +187,8 @@ TEST(BoneField, APartHasTheVoxelsOfTheWholeAndTheirSide) {
   const VoxelMask bones = number_bones(islands, kept, false, volume.dims);
   const HuVolume whole = field_of(volume, bones);
   const SurfaceLevel level{kThreshold_hu};
-  const auto field = BoneField::make(volume, bones, level, always);
+  const SparseMask sparse(bones);
+  const auto field = BoneField::make(volume, sparse, level, always);
   ASSERT_TRUE(field);
   std::array<int, 3> found{};
   for (int i = 0; i < 200; ++i) {

@@ -38,10 +38,10 @@ HuVolume scan_of(const Shape& shape) {
   return volume;
 }
 
-VoxelMask bones_of(const HuVolume& volume) {
+SparseMask bones_of(const HuVolume& volume) {
   VoxelMask bones(volume.dims);
   for (std::size_t i = 0; i < bones.values.size(); ++i) bones.values[i] = volume.values[i] >= kContour_hu ? 1 : 0;
-  return bones;
+  return SparseMask(bones);
 }
 
 constexpr CoordBox kBox{{-30, -30, -30}, {30, 30, 30}};  // ±15 mm
@@ -69,7 +69,7 @@ class Field {
 };
 
 Field by_shapes(const HuVolume& volume) {
-  const VoxelMask bones = bones_of(volume);
+  const SparseMask bones = bones_of(volume);
   const auto shapes = SliceShapes::make(volume, bones, kContour, always);
   EXPECT_TRUE(shapes);
   std::vector<float> values(61 * 61 * 61);
@@ -174,8 +174,9 @@ TEST(SliceShapes, ALeaningPlaneIsExact) {
     for (int y = 0; y < 8; ++y)
       for (int x = 0; x < 40; ++x)
         volume.values.push_back(static_cast<std::int16_t>(100.0 * (x - 16.3 - 1.4 * z)));  // a ramp across the edge
-  VoxelMask bones(volume.dims);
-  for (std::size_t i = 0; i < bones.values.size(); ++i) bones.values[i] = volume.values[i] >= 0 ? 1 : 0;
+  SparseMask bones;
+  bones.dims = volume.dims;
+  for (const std::int16_t value : volume.values) bones.values.push_back(value >= 0 ? 1 : 0);
   const SurfaceLevel zero;
   const auto shapes = SliceShapes::make(volume, bones, zero, always);
   ASSERT_TRUE(shapes);
@@ -210,7 +211,7 @@ TEST(SliceShapes, EveryVoxelKeepsItsSide) {
 
 TEST(SliceShapes, BoxesAreNeverOnOneSideOnlyBecauseTheirVoxelsAre) {
   const HuVolume scan = scan_of([](const Vec3& p) { return p.norm() - 10.0; });
-  const VoxelMask bones = bones_of(scan);
+  const SparseMask bones = bones_of(scan);
   const auto shapes = SliceShapes::make(scan, bones, kContour, always);
   ASSERT_TRUE(shapes);
   std::vector<float> values(512);
@@ -233,7 +234,7 @@ TEST(SliceShapes, BoxesAreNeverOnOneSideOnlyBecauseTheirVoxelsAre) {
 
 TEST(SliceShapes, CanBeStopped) {
   const HuVolume scan = scan_of([](const Vec3& p) { return p.norm() - 10.0; });
-  const VoxelMask bones = bones_of(scan);
+  const SparseMask bones = bones_of(scan);
   for (const double at : {0.0, 0.15, 0.7}) {
     const auto stopped = SliceShapes::make(scan, bones, kContour, [&](double done) { return done < at; });
     ASSERT_FALSE(stopped);

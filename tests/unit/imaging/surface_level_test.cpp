@@ -44,7 +44,8 @@ VoxelMask dense_voxels(const HuVolume& volume) {
 // `plane_mm` says that the edge is.
 double mean_offset_mm(const HuVolume& volume, const VoxelMask& bones, const SurfaceLevel& level,
                       const std::function<double(double y_mm, double z_mm)>& plane_mm) {
-  const auto field = BoneField::make(volume, bones, level, always);
+  const SparseMask kept(bones);
+  const auto field = BoneField::make(volume, kept, level, always);
   const auto [columns, rows, slices] = volume.dims;
   std::vector<std::int16_t> values(static_cast<std::size_t>(columns));
   double sum = 0.0;

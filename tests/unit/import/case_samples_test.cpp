@@ -24,11 +24,11 @@ SampleLabel label_at(const Vec3& at_mm) {
   CaseScan kept;
   kept.geometry.dims = volume.dims;
   kept.hu.assign(volume.count(), 500);
-  kept.labels.assign(volume.count(), 0);
-  std::vector<std::uint8_t> tissue(volume.count(), 0);
+  std::vector<std::uint8_t> labels(volume.count(), 0), tissue(volume.count(), 0);
   const std::size_t bone = volume.index(kBone[0], kBone[1], kBone[2]);
-  kept.labels[bone] = kLabel;
+  labels[bone] = kLabel;
   tissue[bone] = static_cast<std::uint8_t>(Tissue::metal);
+  kept.labels = SparseBytes(labels);
   kept.tissue = SparseBytes(tissue);
   const imaging::VoxelBox all{{0, 0, 0}, {10, 10, 10}};
   const Vec3 index = at_mm / kPitch_mm;

@@ -113,18 +113,20 @@ TEST(Agreement, StopsWhenAsked) {
 
 // A scan of 20 x 20 x 10 voxels, of which the case keeps a part.
 struct TwoLabellings {
-  CaseScan scan{.geometry = {{8, 8, 6}, Vec3(6.0, 6.0, 2.0), Eigen::Matrix3d::Identity()},
-                .labels = std::vector<std::uint8_t>(8 * 8 * 6, 0)};
+  std::vector<std::uint8_t> labels = std::vector<std::uint8_t>(8 * 8 * 6, 0);  // of the case's scan
   TruthLabels truth{.scan = {{20, 20, 10}, Vec3::Zero(), Eigen::Matrix3d::Identity()},
                     .box = {{0, 0, 0}, {19, 19, 9}},
                     .values = std::vector<std::uint8_t>(20 * 20 * 10, 0),
                     .labels = {}};
+  [[nodiscard]] CaseScan scan() const {
+    return {.geometry = {{8, 8, 6}, Vec3(6.0, 6.0, 2.0), Eigen::Matrix3d::Identity()}, .labels = SparseBytes(labels)};
+  }
   // Voxels of the whole scan.
   void draw(int x0, int x1, std::uint8_t ours, std::uint8_t theirs) {
     for (int z = 3; z < 7; ++z)
       for (int y = 7; y < 12; ++y)
         for (int x = x0; x <= x1; ++x) {
-          if (ours != 0) scan.labels[static_cast<std::size_t>(((z - 2) * 8 + y - 6) * 8 + x - 6)] = ours;
+          if (ours != 0) labels[static_cast<std::size_t>(((z - 2) * 8 + y - 6) * 8 + x - 6)] = ours;
           if (theirs != 0) truth.values[static_cast<std::size_t>((z * 20 + y) * 20 + x)] = theirs;
         }
   }
@@ -137,7 +139,7 @@ TEST(CompareLabels, FindsThemByNameAndThenByNumber) {
   l.draw(11, 12, 3, 0);
   l.truth.labels = {{2, "something"}, {9, "Femur"}, {5, "patella"}};
   const std::vector<CaseLabel> labels{{1, "femur"}, {2, "tibia"}, {3, "fibula"}};
-  const auto found = compare_labels(l.scan, labels, l.truth, keep_going);
+  const auto found = compare_labels(l.scan(), labels, l.truth, keep_going);
   ASSERT_TRUE(found) << found.error().message;
   ASSERT_EQ(found->labels.size(), 4u);
   EXPECT_EQ(found->labels[0].truth, "Femur");
@@ -159,7 +161,7 @@ TEST(CompareLabels, CountsBoneBeyondTheScanThatTheCaseKeeps) {
   l.draw(7, 12, 1, 1);
   l.draw(14, 19, 0, 1);
   l.truth.labels = {{1, "femur"}};
-  const auto found = compare_labels(l.scan, {{1, "femur"}}, l.truth, keep_going);
+  const auto found = compare_labels(l.scan(), {{1, "femur"}}, l.truth, keep_going);
   ASSERT_TRUE(found) << found.error().message;
   EXPECT_NEAR(found->labels[0].agreement.dice, 2.0 * 6.0 / (6.0 + 12.0), 1e-12);
   EXPECT_NEAR(found->labels[0].truth_cm3, 2.0 * found->labels[0].volume_cm3, 1e-12);

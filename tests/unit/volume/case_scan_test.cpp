@@ -149,10 +149,13 @@ TEST_F(CaseScanTest, OneChangedVoxelIsAnotherScan) {
   for (const int grid : {0, 1, 2}) {
     CaseScan other = scan_;
     if (grid == 0) other.hu[700] += 1;
-    if (grid == 1) other.labels[700] = other.labels[700] == 1 ? 7 : 1;
+    if (grid == 1) {
+      std::vector<std::uint8_t> labels = scan_.labels.dense();
+      labels[700] = labels[700] == 1 ? 7 : 1;
+      other.labels = SparseBytes(labels);
+    }
     if (grid == 2) {
-      std::vector<std::uint8_t> tissue;
-      for (std::size_t i = 0; i < scan_.tissue.size(); ++i) tissue.push_back(scan_.tissue[i]);
+      std::vector<std::uint8_t> tissue = scan_.tissue.dense();
       tissue[700] = tissue[700] == 1 ? 2 : 1;
       other.tissue = SparseBytes(tissue);
     }
@@ -185,8 +188,7 @@ TEST_F(CaseScanTest, ValuesThatNoLabelListsAreRefused) {
 TEST_F(CaseScanTest, ALargerScanIsRefusedBeforeItIsRead) {
   CaseScan larger{.geometry = scan_.geometry};
   larger.geometry.dims = {64, 64, 64};
-  larger.labels.assign(larger.geometry.count(), 1);
-  for (std::size_t i = 0; i < larger.labels.size(); i += 2) larger.labels[i] = 7;
+  for (std::size_t i = 0; i < larger.geometry.count(); ++i) larger.labels.push_back(i % 2 == 0 ? 7 : 1);
   replace_by(larger);
   const Error wrong = refused();
   EXPECT_EQ(wrong.code, ErrorCode::exhausted) << wrong.message;
