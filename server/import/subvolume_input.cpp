@@ -5,7 +5,7 @@
 #include <cmath>
 #include <utility>
 
-#include "common/imaging/hard_tissue.hpp"
+#include "common/imaging/calibration.hpp"
 #include "common/imaging/island_kinds.hpp"
 #include "common/imaging/segmentation.hpp"
 #include "common/subvolumes/bounding_boxes.hpp"

@@ -5,7 +5,6 @@
 #include <string>
 #include <vector>
 
-#include "common/imaging/calibration.hpp"
 #include "common/subvolumes/bone_voxels.hpp"
 #include "server/import/ct_scan.hpp"
 

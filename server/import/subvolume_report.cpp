@@ -124,7 +124,7 @@ std::string table_of_steps(const SubVolumeMeasures& m) {
   return text;
 }
 
-nlohmann::json json_of(const DataRow& row) {
+nlohmann::json as_json(const DataRow& row) {
   nlohmann::json json{{"voxels", row.voxels},       {"memory_bytes", row.memory_bytes},
                       {"triangles", row.triangles}, {"surface_s", row.surface_s},
                       {"frame_s", row.frame_s},     {"processing_s", row.processing_s()}};
@@ -132,21 +132,21 @@ nlohmann::json json_of(const DataRow& row) {
   return json;
 }
 
-nlohmann::json json_of(const CoordBox& box) {
+nlohmann::json as_json(const CoordBox& box) {
   return {{"first", {box.min.x, box.min.y, box.min.z}}, {"last", {box.max.x, box.max.y, box.max.z}}};
 }
 
-nlohmann::json json_of(const subvolumes::WalkCounts& walk) {
+nlohmann::json as_json(const subvolumes::WalkCounts& walk) {
   return {
       {"visited", walk.visited}, {"computed", walk.computed}, {"modified", walk.modified}, {"removed", walk.removed}};
 }
 
-nlohmann::json json_of(const ActiveReport& s) {
+nlohmann::json as_json(const ActiveReport& s) {
   return {{"tool", s.tool},
           {"poses", s.poses},
           {"sub_volumes",
            {{"active", s.queued},
-            {"voxels", json_of(s.walk)},
+            {"voxels", as_json(s.walk)},
             {"made", s.made},
             {"emptied", s.emptied},
             {"left", s.left},
@@ -155,7 +155,7 @@ nlohmann::json json_of(const ActiveReport& s) {
             {"memory_bytes", s.memory_bytes}}},
           {"openvdb_tree",
            {{"touched", s.touched},
-            {"voxels", json_of(s.leaf_walk)},
+            {"voxels", as_json(s.leaf_walk)},
             {"emptied", s.leaves_emptied},
             {"left", s.leaves_left},
             {"bone_left", s.leaf_bone},
@@ -217,7 +217,7 @@ std::string to_json(const SubVolumeMeasures& m) {
     of = {{"voxels", r.voxels}, {"surface", r.surface}, {"processing", r.processing}};
     if (r.file > 0.0) of["file"] = r.file;
   }
-  for (const CoordBox& section : m.sections) sections.push_back(json_of(section));
+  for (const CoordBox& section : m.sections) sections.push_back(as_json(section));
   for (const SubdivisionCounts& row : m.subdivisions)
     subdivisions.push_back({{"uniform", row.uniform},
                             {"full", row.full},
@@ -225,17 +225,17 @@ std::string to_json(const SubVolumeMeasures& m) {
                             {"empty", row.empty},
                             {"mean_voxels", row.mean_voxels},
                             {"kept", row.kept()}});
-  for (const ActiveReport& step : m.steps) steps.push_back(json_of(step));
+  for (const ActiveReport& step : m.steps) steps.push_back(as_json(step));
   const nlohmann::json report{
       {"scan", m.what},
       {"bone_voxels", m.bone},
-      {"object_box", json_of(m.object)},
+      {"object_box", as_json(m.object)},
       {"sections", sections},
       {"table_5_1",
-       {{"original", json_of(m.original)},
-        {"object_box", json_of(m.object_box)},
-        {"section_sum", json_of(m.section_sum)},
-        {"openvdb_tree", json_of(m.tree)}}},
+       {{"original", as_json(m.original)},
+        {"object_box", as_json(m.object_box)},
+        {"section_sum", as_json(m.section_sum)},
+        {"openvdb_tree", as_json(m.tree)}}},
       {"table_5_2", ratios},
       {"table_5_3", subdivisions},
       {"list", {{"sub_volumes", m.listed}, {"voxels", m.listed_voxels}, {"memory_bytes", m.list_memory_bytes}}},
