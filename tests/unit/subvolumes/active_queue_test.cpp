@@ -100,8 +100,8 @@ TEST(ActiveQueue, CountsVoxelsByTheirDefinition) {
 }
 
 TEST(ActiveQueue, DividesOnlyWhereTheToolIs) {
-  // A full block is one sub-volume, however often it may be divided. A tool at its first corner divides the quadrants
-  // there: of 1 + 1 + 1 + 1 levels three quadrants each stay as they are, and the last one has a hole.
+  // A full block is one sub-volume, however often it may be divided. A tool at its first corner divides it three times.
+  // Each time three quadrants stay full, and the last time the fourth one gets a hole.
   Scene scene = scene_of({32, 32, 4}, Vec3::Ones(), [](Coord) { return true; });
   auto list = SubVolumeList::divide(scene.voxels(), scene.sections(), 3, always);
   ASSERT_TRUE(list);
@@ -112,7 +112,7 @@ TEST(ActiveQueue, DividesOnlyWhereTheToolIs) {
   EXPECT_EQ(step.queued, 1);
   EXPECT_EQ(step.emptied, 0);
   EXPECT_EQ(list->all().size(), 10u);  // 3 + 3 + 3 full, 1 partly full
-  EXPECT_EQ(step.made, 12);            // 4 quadrants of each of 3 subdivisions
+  EXPECT_EQ(step.made, 12);            // four quadrants, three times
   EXPECT_EQ(std::ranges::count(list->all(), Fill::full, &SubVolume::fill), 9);
   EXPECT_EQ(step.walk.removed, remove_from(scene, tool));
   expect_partition(*list, scene, 3);
