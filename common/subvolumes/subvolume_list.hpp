@@ -1,5 +1,5 @@
-// The list of sub-volumes (Niu 2008, §5.2.3): boxes of voxels with their own HU, which cutting changes, divides and
-// removes (§5.4).
+// The list of sub-volumes (Niu 2008, §5.2.3): boxes of voxels with their own HU. Cutting changes, divides and removes
+// them (Niu 2008, §5.4).
 #pragma once
 #include <list>
 #include <span>
