@@ -48,7 +48,7 @@ Result<LeafTree> LeafTree::build(const BoneVoxels& voxels, const CoordBox& box, 
   bool stopped = false;
   for_leaves(box, [&](Coord origin) {
     if (origin.y == floor_to(box.min, kLeafSize).y && !stopped)
-      stopped = !keep_going(static_cast<double>(origin.x - box.min.x) / box.dims().x);
+      stopped = !keep_going(std::max(0.0, static_cast<double>(origin.x - box.min.x)) / box.dims().x);
     if (stopped) return;
     const CoordBox part = common_box(leaf_box(origin), voxels.box());
     bool any = false;

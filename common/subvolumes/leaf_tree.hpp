@@ -16,8 +16,8 @@ struct LeafStep {
   std::int64_t emptied = 0;  // leaves that were removed, because no bone is left in them
 };
 
-// Leaves of 8³ voxels with masked HU as floats, where they have bone; air elsewhere. Not synchronised. `voxels` must
-// outlive it.
+// Leaves of 8³ voxels with masked HU as floats, where they have bone; air elsewhere. Not synchronised. The
+// voxels must outlive it.
 class LeafTree {
  public:
   // `box`: that of the bone. Error: cancelled.
@@ -37,7 +37,7 @@ class LeafTree {
  private:
   explicit LeafTree(const BoneVoxels& voxels);
 
-  const BoneVoxels& voxels_;
+  BoneVoxels voxels_;
   float least_, air_;
   SparseVolume volume_;
 };

@@ -31,7 +31,7 @@ inline constexpr int kMostSubdivisions = 8;
 struct SubdivisionCounts {
   std::int64_t uniform = 0;
   // Found by the first, second ... subdivision; the first entry is for the sections themselves.
-  std::vector<std::int64_t> full, empty;
+  std::vector<std::int64_t> full = {}, empty = {};
   std::int64_t partly_full = 0;
   double mean_voxels = 0.0;  // of a box of the uniform division
 

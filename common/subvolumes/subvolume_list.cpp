@@ -1,6 +1,7 @@
 #include "common/subvolumes/subvolume_list.hpp"
 
 #include <algorithm>
+#include <iterator>
 #include <utility>
 
 namespace osteon::subvolumes {

@@ -18,8 +18,8 @@ struct SubVolume {
   int level = 0;    // how often its section was divided
   Fill fill = Fill::full;
   std::int64_t bone = 0;  // voxels
-  std::vector<std::int16_t> hu;
-  std::vector<std::uint8_t> is_bone;  // not 0: bone
+  std::vector<std::int16_t> hu = {};
+  std::vector<std::uint8_t> is_bone = {};  // not 0: bone
 
   [[nodiscard]] std::size_t index(Coord voxel) const {
     const Coord dims = box.dims();

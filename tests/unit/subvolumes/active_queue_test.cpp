@@ -12,7 +12,7 @@
 namespace osteon::subvolumes {
 namespace {
 
-PlacedTool ball_at(const Vec3& centre_mm, double radius_mm) { return {ball(Vec3::Zero(), radius_mm), {centre_mm, {}}}; }
+PlacedTool ball_at(const Vec3& centre_mm, double radius_mm) { return {ball(Vec3::Zero(), radius_mm), Pose{centre_mm}}; }
 
 // A box that is longer than wide, so that its place in the world's axes matters.
 PlacedTool turned_box(std::mt19937& random, const Scene& scene) {
