@@ -27,10 +27,11 @@ Result<SubVolumeInput> read_input(const SubVolumeArguments& a, const KeepGoing& 
                        " says what is bone");
     return input_of_case(a.scan.input, reading);
   }
+  const double threshold_hu = a.threshold_hu.value_or(imaging::kBoneThreshold_hu);
+  if (is_meta_file(a.scan.input)) return input_of_files(a.scan.input, threshold_hu, reading);
   auto scan = read_scan(a.scan, part(reading, 0.0, 0.5));
   if (!scan) return tl::unexpected(scan.error());
-  auto input =
-      input_of_scan(std::move(*scan), a.threshold_hu.value_or(imaging::kBoneThreshold_hu), part(reading, 0.5, 1.0));
+  auto input = input_of_scan(std::move(*scan), threshold_hu, part(reading, 0.5, 1.0));
   if (!input && input.error().code == ErrorCode::invalid_input)
     return bad_input(a.scan.input + ": " + input.error().message);
   return input;
@@ -70,7 +71,8 @@ void add_subvolume_command(CLI::App& app, std::vector<Command>& commands) {
   const auto shared = std::make_shared<SubVolumeArguments>();
   SubVolumeArguments& a = *shared;
   CLI::App* command = app.add_subcommand(
-      "subvolumes", "Divide the bone of a case or of a scan into sub-volumes, and compare them with OpenVDB's tree");
+      "subvolumes",
+      "Divide the bone of a case, a scan or a Meta.dat into sub-volumes, and compare them with OpenVDB's tree");
   add_scan_options(*command, a.scan, "CASE_DIR|INPUT");
   command->add_option("--out", a.out,
                       "Folder, made by this command: tables (report.txt, report.json), the boxes on the bone "
@@ -82,7 +84,8 @@ void add_subvolume_command(CLI::App& app, std::vector<Command>& commands) {
   command->add_option("--cut", a.cut_mm, "Longest way between two poses of a tool, mm")
       ->check(CLI::Range(0.01, 25.0))
       ->capture_default_str();
-  command->add_option("--threshold", a.threshold_hu, "Of a scan: bone is at or above it, HU (default: 226)")
+  command
+      ->add_option("--threshold", a.threshold_hu, "Of a scan or a Meta.dat: bone is at or above it, HU (default: 226)")
       ->check(CLI::Range(-1000.0, 4000.0));
   commands.push_back({command, [shared](const StopSignal& stop) { return run_subvolumes(*shared, stop); }});
 }

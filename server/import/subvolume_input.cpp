@@ -1,6 +1,7 @@
 #include "server/import/subvolume_input.hpp"
 
 #include <algorithm>
+#include <array>
 #include <bitset>
 #include <cmath>
 #include <utility>
@@ -9,6 +10,7 @@
 #include "common/imaging/island_kinds.hpp"
 #include "common/imaging/segmentation.hpp"
 #include "common/subvolumes/bounding_boxes.hpp"
+#include "common/subvolumes/subvolume_file.hpp"
 #include "common/volume/case.hpp"
 #include "common/volume/case_scan.hpp"
 #include "server/import/ct_case.hpp"
@@ -38,6 +40,39 @@ Result<imaging::VoxelMask> largest_bone(const imaging::HuVolume& part_of_scan, i
                      " HU is bone; give another --threshold");
   const int number = static_cast<int>(found - natures->begin()) + 1;
   return imaging::number_bones(*islands, std::array{number}, true, part_of_scan.dims);
+}
+
+constexpr double kOffVoxel = 0.01;              // of a voxel: two files lie on the same voxels
+constexpr double kMostVoxelsOfFiles = 1 << 30;  // of the box around all of them
+
+// Where the voxels of each file begin in the box around all files, and that box.
+struct PlacedFiles {
+  std::array<double, 3> origin_mm{};
+  std::array<int, 3> dims{};
+  std::vector<Coord> first = {};
+};
+Result<PlacedFiles> place_files(const std::vector<subvolumes::SubVolumeData>& files, const std::string& name) {
+  PlacedFiles placed{.origin_mm = files.front().origin_mm};
+  for (const auto& file : files)
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      placed.origin_mm[axis] = std::min(placed.origin_mm[axis], file.origin_mm[axis]);
+  std::array<double, 3> dims{};
+  for (const auto& file : files) {
+    std::array<double, 3> first{};
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const double at = (file.origin_mm[axis] - placed.origin_mm[axis]) / file.spacing_mm[axis];
+      first[axis] = std::round(at);
+      dims[axis] = std::max(dims[axis], first[axis] + file.dims[axis]);
+      if (!(std::abs(at - first[axis]) <= kOffVoxel))
+        return bad_input("the ORIGIN of the files that " + name +
+                         " lists are not whole voxels apart; write all of them from one scan");
+    }
+    if (!(dims[0] * dims[1] * dims[2] <= kMostVoxelsOfFiles) || !(std::ranges::max(dims) <= imaging::kLargestScanAxis))
+      return bad_input("the files that " + name + " lists are too far apart by their ORIGIN; write them again");
+    placed.first.push_back({static_cast<int>(first[0]), static_cast<int>(first[1]), static_cast<int>(first[2])});
+  }
+  for (std::size_t axis = 0; axis < 3; ++axis) placed.dims[axis] = static_cast<int>(dims[axis]);
+  return placed;
 }
 
 // The part of a volume within the region.
@@ -79,6 +114,40 @@ Result<SubVolumeInput> input_of_case(const fs::path& folder, const KeepGoing& ke
   for (std::uint8_t& label : input.bone) label = carved.test(label) ? 1 : 0;
   if (std::ranges::count(input.bone, 1) == 0)
     return bad_input(folder.string() + " has no voxel of bone in its scan; import it again");
+  return input;
+}
+
+bool is_meta_file(const fs::path& file) {
+  std::error_code error;
+  return file.filename() == subvolumes::kMetaFile && fs::is_regular_file(file, error);
+}
+
+Result<SubVolumeInput> input_of_files(const fs::path& meta_file, double threshold_hu, const KeepGoing& keep_going) {
+  const auto files = subvolumes::read_sub_volumes(meta_file, keep_going);
+  if (!files) return tl::unexpected(files.error());
+  const auto placed = place_files(*files, meta_file.string());
+  if (!placed) return tl::unexpected(placed.error());
+  SubVolumeInput input;
+  const std::array<double, 3>& spacing_mm = files->front().spacing_mm;
+  input.geometry = {placed->dims, Vec3(placed->origin_mm[0], placed->origin_mm[1], placed->origin_mm[2]),
+                    Vec3(spacing_mm[0], spacing_mm[1], spacing_mm[2]).asDiagonal()};
+  input.threshold_hu = threshold_hu;
+  input.what = "files of " + std::to_string(files->size()) + " sub-volumes";
+  input.hu.assign(input.geometry.count(), subvolumes::kAir_hu);
+  for (std::size_t i = 0; i < files->size(); ++i) {
+    const auto& [columns, rows, slices] = (*files)[i].dims;
+    auto from = (*files)[i].hu.begin();
+    for (int z = 0; z < slices; ++z)
+      for (int y = 0; y < rows; ++y, from += columns)
+        std::copy_n(
+            from, columns,
+            input.hu.begin() + static_cast<std::ptrdiff_t>(input.voxels().index(placed->first[i] + Coord{0, y, z})));
+  }
+  input.bone.reserve(input.hu.size());
+  for (const std::int16_t hu : input.hu) input.bone.push_back(hu >= threshold_hu ? 1 : 0);
+  if (std::ranges::count(input.bone, 1) == 0)
+    return bad_input("no voxel of the files that " + meta_file.string() + " lists reaches the threshold of " +
+                     std::to_string(std::lround(threshold_hu)) + " HU; give a lower --threshold");
   return input;
 }
 

@@ -185,6 +185,37 @@ TEST(SubVolumeReport, IsThereAsAWholeOrNotAtAll) {
   EXPECT_EQ(bytes, m->section_sum.file_bytes);
 }
 
+// The files of a section lie where the section was, so the box around them is the object box.
+TEST(SubVolumeInput, OfItsOwnFilesIsTheObjectBox) {
+  const test::TempDir folder;
+  const SubVolumeInput input = shaft_input();
+  const auto m = measure_sub_volumes(input, {}, keep_going);
+  ASSERT_TRUE(m);
+  ASSERT_TRUE(write_sub_volumes(input, *m, folder / "out", keep_going));
+  const fs::path meta = folder / "out" / "Meta.dat";
+  ASSERT_TRUE(is_meta_file(meta));
+  const auto again = input_of_files(meta, 226.0, keep_going);
+  ASSERT_TRUE(again) << again.error().message;
+  EXPECT_EQ(again->hu, voxels_of_box(input.voxels(), m->object).hu);
+  const auto measured = measure_sub_volumes(*again, {}, keep_going);
+  ASSERT_TRUE(measured);
+  EXPECT_EQ(measured->bone, m->bone);
+  EXPECT_EQ(measured->section_sum.voxels, m->section_sum.voxels);
+  EXPECT_EQ(measured->original.voxels, m->object_box.voxels);
+  EXPECT_FALSE(input_of_files(meta, 2000.0, keep_going));
+  // Half a voxel aside, and a kilometre away.
+  const auto text = read_file(folder / "out" / "SBB2.dat");
+  ASSERT_TRUE(text);
+  const std::size_t at = text->find("ORIGIN "), end = text->find('\n', at);
+  for (const char* origin : {"ORIGIN 7.75 6.5 8", "ORIGIN 1e+06 6.5 8", "ORIGIN 7.5 6.5 1e+300"}) {
+    ASSERT_TRUE(write_file(folder / "out" / "SBB2.dat", text->substr(0, at) + origin + text->substr(end)));
+    const auto refused = input_of_files(meta, 226.0, keep_going);
+    ASSERT_FALSE(refused) << origin;
+    EXPECT_EQ(refused.error().code, ErrorCode::invalid_input);
+    EXPECT_THAT(refused.error().message, HasSubstr("ORIGIN"));
+  }
+}
+
 class SubVolumeProgram : public ::testing::Test {
  protected:
   SubVolumeProgram() {
@@ -218,6 +249,9 @@ TEST_F(SubVolumeProgram, PrintsTheTablesOfAScanAndOfItsCase) {
                            "2 sections of 6 14 slices", "read again to the same bytes"})
     EXPECT_THAT(scan.out, HasSubstr(part));
   EXPECT_TRUE(fs::exists(folder_ / "out" / "boxes.png"));
+  const auto files = test::run(OSTEON_IMPORT_PROGRAM, {"subvolumes", path("out/Meta.dat")});
+  ASSERT_EQ(files.exit_code, 0) << files.err;
+  EXPECT_THAT(files.out, HasSubstr("2 sections of 6 14 slices"));
   ASSERT_EQ(run({"--out", path("case")}, "ct").exit_code, 0);
   const auto of_case = test::run(OSTEON_IMPORT_PROGRAM, {"subvolumes", path("case"), "--carve", path("script.yaml")});
   ASSERT_EQ(of_case.exit_code, 0) << of_case.err;
