@@ -20,7 +20,15 @@ struct SubVolumeArguments {
   double cut_mm = MeasureOptions{}.cut_mm;
 };
 
+// Whether an option is given that only a scan takes.
+bool has_scan_options(const ScanArguments& a) {
+  return a.series || a.skip_bytes || a.slope || a.intercept ||
+         !(a.size + a.spacing + a.type + a.byte_order + a.axes + a.grey_window).empty();
+}
+
 Result<SubVolumeInput> read_input(const SubVolumeArguments& a, const KeepGoing& reading) {
+  if ((is_case(a.scan.input) || is_meta_file(a.scan.input)) && has_scan_options(a.scan))
+    return bad_input(a.scan.input + " says itself how it is to be read; leave out the options for scans");
   if (is_case(a.scan.input)) {
     if (a.threshold_hu)
       return bad_input("--threshold is for a scan; leave it out, because the case " + a.scan.input +

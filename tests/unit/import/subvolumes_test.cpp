@@ -266,6 +266,7 @@ TEST_F(SubVolumeProgram, SaysInOneSentenceWhatIsWrong) {
   expect_sentence(run({"--subdivisions", "9"}), "--subdivisions");
   ASSERT_EQ(run({"--out", path("case")}, "ct").exit_code, 0);
   expect_sentence(test::run(OSTEON_IMPORT_PROGRAM, {"subvolumes", path("case"), "--threshold", "300"}), "--threshold");
+  expect_sentence(test::run(OSTEON_IMPORT_PROGRAM, {"subvolumes", path("case"), "--series", "1"}), "leave out");
   ASSERT_EQ(test::run(OSTEON_IMPORT_PROGRAM,
                       {"phantom", "block", "--layers", "4:1.5", "--width", "6", "--out", path("block")})
                 .exit_code,
