@@ -120,7 +120,7 @@ TEST(SubVolumeMeasures, StopAtEachQuestion) {
     last = fraction;
     return ++questions > 0;
   }));
-  for (int stop = 1; stop <= questions; stop += 1 + questions / 40) {
+  for (int stop = 1; stop <= questions; stop += 1 + questions / 12) {
     int asked = 0;
     const auto stopped = measure_sub_volumes(input, options, [&](double) { return ++asked < stop; });
     ASSERT_FALSE(stopped) << stop;
