@@ -25,7 +25,7 @@ CoordBox world_block(const PlacedTool& tool, const ScanGeometry& geometry) {
     block.include(to_voxel * (tool.pose_bone_tool.point(at) - geometry.origin_mm));
   }
   // A tool far from the scan must not overflow the integers of a voxel.
-  constexpr double kFarthest = 1 << 24;
+  static constexpr double kFarthest = 1 << 24;
   const auto whole = [](double value) { return static_cast<std::int32_t>(std::clamp(value, -kFarthest, kFarthest)); };
   // A voxel on a face belongs to the block, also after rounding.
   constexpr double kMargin = 1e-6;

@@ -15,8 +15,8 @@ inline void expect_partition(const SubVolumeList& list, const Scene& scene, int 
     EXPECT_EQ(part.fill, part.bone == voxels_of(part.box) ? Fill::full : Fill::partly_full);
     EXPECT_LE(part.level, subdivisions);
     // One that is partly full is as fine as it can be.
-    if (part.fill == Fill::partly_full)
-      EXPECT_TRUE(part.level == subdivisions || (part.box.dims().x == 1 && part.box.dims().y == 1));
+    EXPECT_TRUE(part.fill == Fill::full || part.level == subdivisions ||
+                (part.box.dims().x == 1 && part.box.dims().y == 1));
     std::int64_t bone = 0;
     for_each_voxel(part.box, [&](Coord at) {
       const std::size_t i = scene.voxels().index(at);
@@ -27,10 +27,7 @@ inline void expect_partition(const SubVolumeList& list, const Scene& scene, int 
     EXPECT_EQ(bone, part.bone);
   }
   for (std::size_t i = 0; i < having.size(); ++i)
-    if (scene.bone[i] != 0)
-      EXPECT_EQ(having[i], 1);
-    else
-      EXPECT_LE(having[i], 1);
+    EXPECT_TRUE(having[i] == 1 || (having[i] == 0 && scene.bone[i] == 0)) << having[i];
 }
 
 }  // namespace osteon::subvolumes
