@@ -317,9 +317,11 @@ Result<std::vector<SubVolumeData>> read_sub_volumes(const fs::path& meta_file, c
   for (const MetaEntry& entry : meta->entries) {
     if (!keep_going(static_cast<double>(all.size()) / static_cast<double>(meta->entries.size())))
       return stopped_while("reading the sub-volumes");
-    const fs::path file = meta_file.parent_path() / meta->directory / entry.file;
+    const fs::path file = (meta_file.parent_path() / meta->directory / entry.file).lexically_normal();
     const auto content = read_file(file);
-    if (!content) return tl::unexpected(content.error());
+    if (!content)
+      return failure(content.error().code,
+                     content.error().message + "; put the file there, because " + meta_file.string() + " lists it");
     auto data = parse_sub_volume(*content, file.string());
     if (!data) return tl::unexpected(data.error());
     if (data->dims[2] != entry.slices)
