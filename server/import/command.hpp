@@ -23,6 +23,7 @@ struct Command {
 
 void add_case_commands(CLI::App& app, std::vector<Command>& commands);  // make and describe cases
 void add_registration_command(CLI::App& app, std::vector<Command>& commands);
+void add_subvolume_command(CLI::App& app, std::vector<Command>& commands);
 void add_bone_commands(CLI::App& app, std::vector<Command>& commands);  // work on a case's bone, and list the tools
 
 // One progress bar over all stages. It appears when the first work is done, so a refused input prints only its

@@ -20,6 +20,7 @@ int main(int argc, char** argv) {
   import::add_case_commands(app, commands);
   import::add_registration_command(app, commands);
   import::add_bone_commands(app, commands);
+  import::add_subvolume_command(app, commands);
   if (const auto code = parse_arguments(app, argc, argv)) return *code;
 
   const StopSignal stop;

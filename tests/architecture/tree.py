@@ -14,6 +14,7 @@ LAYERS = {
     "mechanics": {"core", "geometry", "tools", "field"},
     "sound": {"core"},
     "runtime": {"core"},
+    "subvolumes": {"core", "geometry", "tools", "field", "volume", "surface", "runtime"},
     "access": {"core"},
     "link": {"core", "geometry"},
     "input": {"core", "geometry", "runtime"},

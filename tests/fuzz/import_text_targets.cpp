@@ -1,11 +1,12 @@
 // Targets for text that a person writes for the import: a tool, a list of cuts, a legend, a list of edits, a list
-// of landmarks.
+// of landmarks. And for the text of sub-volumes.
 #include <cmath>
 #include <set>
 #include <string>
 #include <string_view>
 
 #include "common/core/check.hpp"
+#include "common/subvolumes/subvolume_file.hpp"
 #include "common/tools/tool_file.hpp"
 #include "server/import/carve_script.hpp"
 #include "server/import/edit_file.hpp"
@@ -79,6 +80,21 @@ void read_and_fit_landmarks(std::span<const std::uint8_t> data) {
   OSTEON_CHECK(std::abs(fit->pose_fixed_moving.rotation.norm() - 1.0) < 1e-9);
 }
 
+// An accepted file is written back to the same bytes.
+void read_sub_volume(std::span<const std::uint8_t> data) {
+  const std::string_view text(reinterpret_cast<const char*>(data.data()), data.size());
+  const auto read = subvolumes::parse_sub_volume(text, "SBB1.dat");
+  if (!read) return expect_bounded(read.error());
+  OSTEON_CHECK(subvolumes::to_text(*read) == text);
+}
+
+void read_meta(std::span<const std::uint8_t> data) {
+  const std::string_view text(reinterpret_cast<const char*>(data.data()), data.size());
+  const auto read = subvolumes::parse_meta(text, "Meta.dat");
+  if (!read) return expect_bounded(read.error());
+  OSTEON_CHECK(subvolumes::to_text(*read) == text);
+}
+
 Target text_target(std::string name, void (*read)(std::span<const std::uint8_t>), std::vector<Bytes> seeds) {
   Target target{std::move(name), read, std::move(seeds)};
   target.change = change_number;
@@ -133,6 +149,20 @@ Target landmarks_target() {
                                     "  - {fixed_mm: [31, 2, 20], moving_mm: [41, -2, 25]}\n"
                                     "  - {name: base, fixed_mm: [1, 42, 20], moving_mm: [11, 38, 25]}\n"
                                     "  - {fixed_mm: [1, 2, 60], moving_mm: [11, -2, 64.5]}\n")});
+}
+
+Target sub_volume_target() {
+  return text_target(
+      "sub_volume", read_sub_volume,
+      {bytes_of_text("DATASET SUB-VOLUME DATA\nDIMENSIONS 2 3 1\nSPACING 0.489 0.489 1.5\nORIGIN -12.5 0 100\n"
+                     "DATA NUMBER 6\nBOUNDARY POSITION\n0 0 0 1 0\n1 -1 1 -1 1\n2 1 2 1 2\n"
+                     "MEDICAL DATA\n700 1200\n-1000 40\n0 226\n")});
+}
+
+Target sub_volume_meta_target() {
+  return text_target("sub_volume_meta", read_meta,
+                     {bytes_of_text("DATASET SUB-VOLUME META\nDIRECTORY .\nNUMBER 2\n"
+                                    "FILE START SLICES SUBDIVISIONS\nSBB1.dat 0 22 3\nSBB2.dat 25 1 0\n")});
 }
 
 }  // namespace osteon::fuzz

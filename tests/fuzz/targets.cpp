@@ -240,6 +240,8 @@ std::vector<Target> targets() {
       legend_target(),
       edits_target(),
       landmarks_target(),
+      sub_volume_target(),
+      sub_volume_meta_target(),
       case_info_target(),
       bone_volume_target(),
       scan_volume_target(),

@@ -236,7 +236,8 @@ TEST_P(Pages, RunFromAnEmptyFolder) {
 
 INSTANTIATE_TEST_SUITE_P(All, Pages,
                          testing::Values("README.md", "deploy/docs/guide.md", "deploy/docs/tools.md",
-                                         "deploy/docs/haptics.md", "deploy/docs/operate.md"),
+                                         "deploy/docs/haptics.md", "deploy/docs/operate.md",
+                                         "deploy/docs/subvolumes.md"),
                          [](const auto& one) {
                            std::string name = std::filesystem::path(one.param).stem().string();
                            name[0] = static_cast<char>(std::toupper(name[0]));
