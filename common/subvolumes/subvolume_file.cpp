@@ -124,7 +124,7 @@ void expect_form(std::string_view text, const std::string& form) {
 
 Error about(const std::string& name, const char* kind, const Fault& fault) {
   return {ErrorCode::invalid_input, name + " is no valid " + kind + ": line " + std::to_string(fault.line) + " " +
-                                        fault.what + "; write the file again with osteon-import subvolumes"};
+                                        fault.what + "; write the file again with osteon-import report"};
 }
 
 SubVolumeData read_header(Lines& lines) {
@@ -326,11 +326,11 @@ Result<std::vector<SubVolumeData>> read_sub_volumes(const fs::path& meta_file, c
     if (!data) return tl::unexpected(data.error());
     if (data->dims[2] != entry.slices)
       return bad_input(file.string() + " has " + std::to_string(data->dims[2]) + " slices, but " + meta_file.string() +
-                       " says " + std::to_string(entry.slices) + "; write both again with osteon-import subvolumes");
+                       " says " + std::to_string(entry.slices) + "; write both again with osteon-import report");
     if (!all.empty() && data->spacing_mm != all.front().spacing_mm)
       return bad_input(file.string() +
                        " has another SPACING than the sub-volumes before it; write all of them again "
-                       "with osteon-import subvolumes");
+                       "with osteon-import report");
     all.push_back(std::move(*data));
   }
   return all;

@@ -14,7 +14,7 @@ namespace {
 
 struct SubVolumeArguments {
   ScanArguments scan;
-  std::string out, script;
+  std::string source, out, script;
   std::optional<double> threshold_hu;
   int subdivisions = MeasureOptions{}.subdivisions;
   double cut_mm = MeasureOptions{}.cut_mm;
@@ -27,13 +27,23 @@ bool has_scan_options(const ScanArguments& a) {
 }
 
 Result<SubVolumeInput> read_input(const SubVolumeArguments& a, const KeepGoing& reading) {
-  if ((is_case(a.scan.input) || is_meta_file(a.scan.input)) && has_scan_options(a.scan))
+  const bool of_source = is_case(a.scan.input) && !a.source.empty();
+  if (!a.source.empty() && !of_source)
+    return bad_input("--source is for a case; leave it out, because " + a.scan.input + " is none");
+  if ((is_case(a.scan.input) || is_meta_file(a.scan.input)) && has_scan_options(a.scan) && !of_source)
     return bad_input(a.scan.input + " says itself how it is to be read; leave out the options for scans");
   if (is_case(a.scan.input)) {
     if (a.threshold_hu)
       return bad_input("--threshold is for a scan; leave it out, because the case " + a.scan.input +
                        " says what is bone");
-    return input_of_case(a.scan.input, reading);
+    if (!of_source) return input_of_case(a.scan.input, reading);
+    const auto of_case = input_of_case(a.scan.input, part(reading, 0.0, 0.3));
+    if (!of_case) return of_case;
+    ScanArguments from = a.scan;
+    from.input = a.source;
+    auto source = read_scan(from, part(reading, 0.3, 1.0));
+    if (!source) return tl::unexpected(source.error());
+    return input_in_source(*of_case, std::move(*source), a.source);
   }
   const double threshold_hu = a.threshold_hu.value_or(imaging::kBoneThreshold_hu);
   if (is_meta_file(a.scan.input)) return input_of_files(a.scan.input, threshold_hu, reading);
@@ -79,9 +89,11 @@ void add_subvolume_command(CLI::App& app, std::vector<Command>& commands) {
   const auto shared = std::make_shared<SubVolumeArguments>();
   SubVolumeArguments& a = *shared;
   CLI::App* command = app.add_subcommand(
-      "subvolumes",
+      "report",
       "Divide the bone of a case, a scan or a Meta.dat into sub-volumes, and compare them with OpenVDB's tree");
   add_scan_options(*command, a.scan, "CASE_DIR|INPUT");
+  command->add_option("--source", a.source,
+                      "Of a case: the scan from which it was imported. Then the original data are the whole scan");
   command->add_option("--out", a.out,
                       "Folder, made by this command: tables (report.txt, report.json), the boxes on the bone "
                       "(boxes.png), and the files of the sub-volumes (Meta.dat, SBB1.dat ...)");

@@ -108,12 +108,43 @@ Result<SubVolumeInput> input_of_case(const fs::path& folder, const KeepGoing& ke
     if (is_carved(label.kind)) carved.set(static_cast<std::size_t>(label.value));
   SubVolumeInput input{.geometry = scan->geometry,
                        .hu = std::move(scan->hu),
-                       .bone = std::move(scan->labels),
+                       .bone = scan->labels.dense(),
                        .threshold_hu = bone->info().threshold_hu,
                        .what = "the part that a case keeps of " + bone->info().source};
   for (std::uint8_t& label : input.bone) label = carved.test(label) ? 1 : 0;
   if (std::ranges::count(input.bone, 1) == 0)
     return bad_input(folder.string() + " has no voxel of bone in its scan; import it again");
+  return input;
+}
+
+Result<SubVolumeInput> input_in_source(const SubVolumeInput& of_case, CtScan source, const std::string& name) {
+  imaging::HuVolume& volume = source.volume;
+  SubVolumeInput input{.geometry = {volume.dims, volume.origin_mm, volume.directions * volume.spacing_mm.asDiagonal()},
+                       .hu = {},
+                       .bone = std::vector<std::uint8_t>(volume.count(), 0),
+                       .threshold_hu = of_case.threshold_hu,
+                       .what = source.source};
+  const auto& [dims, origin_mm, axes_mm] = of_case.geometry;
+  const Vec3 at = input.geometry.axes_mm.inverse() * (origin_mm - input.geometry.origin_mm);
+  const Vec3 last(dims[0] - 1, dims[1] - 1, dims[2] - 1);
+  bool fits = (axes_mm - input.geometry.axes_mm).colwise().norm().dot(last) <= kOffVoxel * axes_mm.norm();
+  std::array<int, 3> first{};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const double from = at[static_cast<int>(axis)];
+    fits = fits && std::abs(from - std::round(from)) <= kOffVoxel && from > -0.5 &&
+           from + dims[axis] < volume.dims[axis] + 0.5;
+    first[axis] = fits ? static_cast<int>(std::lround(from)) : 0;
+  }
+  if (!fits)
+    return bad_input("the voxels of the case are not some of those of " + name +
+                     "; give the scan from which the case was imported as --source");
+  auto from = of_case.bone.begin();
+  for (int slice = 0; slice < dims[2]; ++slice)
+    for (int row = 0; row < dims[1]; ++row, from += dims[0])
+      std::copy_n(
+          from, dims[0],
+          input.bone.begin() + static_cast<std::ptrdiff_t>(volume.index(first[0], first[1] + row, first[2] + slice)));
+  input.hu = std::move(volume.values);
   return input;
 }
 

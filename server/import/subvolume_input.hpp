@@ -1,4 +1,4 @@
-// The scan and its bone that `osteon-import subvolumes` divides: of a case, of a scan that has not been
+// The scan and its bone that `osteon-import report` divides: of a case, of a scan that has not been
 // imported, or of files of sub-volumes.
 #pragma once
 #include <cstdint>
@@ -27,6 +27,11 @@ struct SubVolumeInput {
 // The scan that a case keeps; its labels say what is bone. Errors: those of Case::load() and load_scan(), and
 // invalid_input (the case has no HU).
 [[nodiscard]] Result<SubVolumeInput> input_of_case(const std::filesystem::path& folder, const KeepGoing& keep_going);
+
+// The whole scan from which a case was imported, with the bone of the case. `name`: of the scan, for errors. Error:
+// invalid_input (the voxels of the case are not some of the scan's).
+[[nodiscard]] Result<SubVolumeInput> input_in_source(const SubVolumeInput& of_case, CtScan source,
+                                                     const std::string& name);
 
 // Whether the file is the Meta file of sub-volumes, by its name.
 [[nodiscard]] bool is_meta_file(const std::filesystem::path& file);

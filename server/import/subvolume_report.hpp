@@ -1,4 +1,4 @@
-// The report of `osteon-import subvolumes`: tables as text and as JSON, and a picture of the boxes on the bone.
+// The report of `osteon-import report`: tables as text and as JSON, and a picture of the boxes on the bone.
 #pragma once
 #include <filesystem>
 #include <string>

@@ -1,4 +1,4 @@
-// `osteon-import subvolumes`: tables of known bones and of real scans, its files, and its sentences.
+// `osteon-import report`: tables of known bones and of real scans, its files, and its sentences.
 #include <gmock/gmock.h>
 
 #include <fstream>
@@ -228,7 +228,7 @@ class SubVolumeProgram : public ::testing::Test {
   }
   [[nodiscard]] std::string path(const char* name) const { return (folder_ / name).string(); }
   // With the options of the raw scan.
-  [[nodiscard]] test::RunResult run(std::vector<std::string> more, const char* command = "subvolumes") const {
+  [[nodiscard]] test::RunResult run(std::vector<std::string> more, const char* command = "report") const {
     std::vector<std::string> arguments{command, path("scan.raw"), "--size", "40,36,24", "--spacing", "0.5,0.5,1"};
     arguments.insert(arguments.end(), more.begin(), more.end());
     return test::run(OSTEON_IMPORT_PROGRAM, arguments);
@@ -249,29 +249,64 @@ TEST_F(SubVolumeProgram, PrintsTheTablesOfAScanAndOfItsCase) {
                            "2 sections of 6 14 slices", "read again to the same bytes"})
     EXPECT_THAT(scan.out, HasSubstr(part));
   EXPECT_TRUE(fs::exists(folder_ / "out" / "boxes.png"));
-  const auto files = test::run(OSTEON_IMPORT_PROGRAM, {"subvolumes", path("out/Meta.dat")});
+  const auto files = test::run(OSTEON_IMPORT_PROGRAM, {"report", path("out/Meta.dat")});
   ASSERT_EQ(files.exit_code, 0) << files.err;
   EXPECT_THAT(files.out, HasSubstr("2 sections of 6 14 slices"));
   ASSERT_EQ(run({"--out", path("case")}, "ct").exit_code, 0);
-  const auto of_case = test::run(OSTEON_IMPORT_PROGRAM, {"subvolumes", path("case"), "--carve", path("script.yaml")});
+  const auto of_case = test::run(OSTEON_IMPORT_PROGRAM, {"report", path("case"), "--carve", path("script.yaml")});
   ASSERT_EQ(of_case.exit_code, 0) << of_case.err;
   EXPECT_THAT(of_case.out, HasSubstr("2 sections of 6 14 slices"));
+  const auto of_source = test::run(OSTEON_IMPORT_PROGRAM, {"report", path("case"), "--source", path("scan.raw"),
+                                                           "--size", "40,36,24", "--spacing", "0.5,0.5,1"});
+  ASSERT_EQ(of_source.exit_code, 0) << of_source.err;
+  EXPECT_THAT(of_source.out, HasSubstr("2 sections of 6 14 slices"));
+  EXPECT_THAT(of_source.out, HasSubstr("40"));
+}
+
+// The voxels of the case at their place in the scan.
+TEST(SubVolumeInput, OfACaseInItsSourceIsThatOfTheSource) {
+  const SubVolumeInput whole = shaft_input();
+  const std::array<int, 3> first{5, 3, 1}, dims{30, 26, 22};
+  SubVolumeInput of_case{.geometry = {dims, whole.geometry.position_mm(Vec3(5, 3, 1)), whole.geometry.axes_mm},
+                         .hu = {},
+                         .bone = {},
+                         .threshold_hu = whole.threshold_hu,
+                         .what = "a case"};
+  for (int z = 0; z < dims[2]; ++z)
+    for (int y = 0; y < dims[1]; ++y)
+      for (int x = 0; x < dims[0]; ++x)
+        of_case.bone.push_back(is_bone_of_scan(x + first[0], y + first[1], z + first[2]) ? 1 : 0);
+  const auto placed = input_in_source(of_case, shaft_scan(), "scan");
+  ASSERT_TRUE(placed) << placed.error().message;
+  EXPECT_EQ(placed->bone, whole.bone);
+  EXPECT_EQ(placed->hu, whole.hu);
+  EXPECT_EQ(placed->geometry, whole.geometry);
+  SubVolumeInput half_a_voxel = of_case, beyond = of_case, coarser = of_case;
+  half_a_voxel.geometry.origin_mm.x() += 0.25;
+  beyond.geometry.origin_mm.z() += 2.0;
+  coarser.geometry.axes_mm *= 1.01;
+  for (const SubVolumeInput& wrong : {half_a_voxel, beyond, coarser}) {
+    const auto refused = input_in_source(wrong, shaft_scan(), "scan");
+    ASSERT_FALSE(refused);
+    EXPECT_THAT(refused.error().message, HasSubstr("--source"));
+  }
 }
 
 TEST_F(SubVolumeProgram, SaysInOneSentenceWhatIsWrong) {
   fs::create_directories(folder_ / "out");
   expect_sentence(run({"--out", path("out")}), "already there");
   expect_sentence(run({"--carve", path("none.yaml")}), "there is no script");
-  expect_sentence(test::run(OSTEON_IMPORT_PROGRAM, {"subvolumes", path("none")}), "there is no file or folder");
+  expect_sentence(test::run(OSTEON_IMPORT_PROGRAM, {"report", path("none")}), "there is no file or folder");
   expect_sentence(run({"--subdivisions", "9"}), "--subdivisions");
   ASSERT_EQ(run({"--out", path("case")}, "ct").exit_code, 0);
-  expect_sentence(test::run(OSTEON_IMPORT_PROGRAM, {"subvolumes", path("case"), "--threshold", "300"}), "--threshold");
-  expect_sentence(test::run(OSTEON_IMPORT_PROGRAM, {"subvolumes", path("case"), "--series", "1"}), "leave out");
+  expect_sentence(test::run(OSTEON_IMPORT_PROGRAM, {"report", path("case"), "--threshold", "300"}), "--threshold");
+  expect_sentence(test::run(OSTEON_IMPORT_PROGRAM, {"report", path("case"), "--series", "1"}), "leave out");
+  expect_sentence(run({"--source", path("case")}), "--source is for a case");
   ASSERT_EQ(test::run(OSTEON_IMPORT_PROGRAM,
                       {"phantom", "block", "--layers", "4:1.5", "--width", "6", "--out", path("block")})
                 .exit_code,
             0);
-  expect_sentence(test::run(OSTEON_IMPORT_PROGRAM, {"subvolumes", path("block")}), path("block"));
+  expect_sentence(test::run(OSTEON_IMPORT_PROGRAM, {"report", path("block")}), path("block"));
 }
 
 // Tables of real bones, with a tool through the middle of their box.
