@@ -40,8 +40,7 @@ template <class Parameters>
       for (const auto& known : fields) all += (all.empty() ? "" : ", ") + std::string(known.name);
       return bad_input("\"" + name + "\" is no parameter of this bone; write one of " + all);
     }
-    if (!(value >= field->least && value <= field->most))
-      return bad_parameter(name, value, field->least, field->most);
+    if (!(value >= field->least && value <= field->most)) return bad_parameter(name, value, field->least, field->most);
     parameters.*field->value = value;
   }
   return {};
@@ -51,8 +50,7 @@ template <class Parameters>
 [[nodiscard]] std::vector<NamedValue> values_of(const Parameters& parameters,
                                                 std::span<const ParameterField<Parameters>> fields) {
   std::vector<NamedValue> values;
-  for (const auto& field : fields)
-    values.push_back({field.name, parameters.*field.value, field.least, field.most});
+  for (const auto& field : fields) values.push_back({field.name, parameters.*field.value, field.least, field.most});
   return values;
 }
 
@@ -68,9 +66,9 @@ void scale_lengths(Parameters& parameters, std::span<const ParameterField<Parame
 struct ConditionFactors {
   double cortex = 1.0, cancellous = 1.0;
 };
-// Cortex: Feik 1997 found a medullary canal of some 20 % of the section of the femur's midshaft in the young and of some
-// 41 % in women in their eighties, without the pores of cortex. A ring has the thickness r (1 - √share), so cortex is
-// 1.1 times as thick as that of our adults (share 0.25) in the young, and 0.8 times in the old. [A] Cancellous bone.
+// Cortex: Feik 1997 found a medullary canal of some 20 % of the section of the femur's midshaft in the young and of
+// some 41 % in women in their eighties, without the pores of cortex. A ring has the thickness r (1 - √share), so cortex
+// is 1.1 times as thick as that of our adults (share 0.25) in the young, and 0.8 times in the old. [A] Cancellous bone.
 [[nodiscard]] inline ConditionFactors factors_of(std::string_view condition) {
   if (condition == "young") return {1.1, 1.2};
   if (condition == "osteoporotic") return {0.8, 0.6};

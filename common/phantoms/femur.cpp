@@ -160,7 +160,9 @@ Result<void> check_femur(const FemurParameters& p) {
   const double large = std::max(p.medial_condyle_radius_mm, p.lateral_condyle_radius_mm);
   const double small = std::min(p.medial_condyle_radius_mm, p.lateral_condyle_radius_mm);
   const double condyles_mm = p.notch_width_mm + 2.0 * p.condyle_width_mm;
-  const double neck_mm = p.offset_mm / std::sin(p.neck_shaft_degrees * kRadians);
+  // A neck that leaves the shaft before it meets the head.
+  const double least_offset_mm =
+      (0.5 * p.width_80_mm + 0.55 * p.head_diameter_mm) * std::sin(p.neck_shaft_degrees * kRadians);
   // Where the lateral face of the shaft would be beside the neck, as far from the medial face of the head.
   const double beside_mm = p.offset_mm + 0.5 * p.head_diameter_mm + 0.5 * p.width_80_mm;
   struct Row {
@@ -171,8 +173,7 @@ Result<void> check_femur(const FemurParameters& p) {
   const Row rows[] = {
       {"neck_height_mm", p.neck_height_mm, 0.0, 0.9 * p.head_diameter_mm, "head_diameter_mm"},
       {"neck_depth_mm", p.neck_depth_mm, 0.0, p.neck_height_mm, "neck_height_mm"},
-      {"offset_mm", p.offset_mm, p.offset_mm + 0.5 * p.width_80_mm + 0.55 * p.head_diameter_mm - neck_mm, 60.0,
-       "head_diameter_mm and width_80_mm"},
+      {"offset_mm", p.offset_mm, least_offset_mm, 60.0, "neck_shaft_degrees, head_diameter_mm and width_80_mm"},
       {"proximal_width_mm", p.proximal_width_mm, beside_mm - 8.0, beside_mm + 22.0,
        "offset_mm, head_diameter_mm and width_80_mm"},
       {"lateral_condyle_radius_mm", p.lateral_condyle_radius_mm, p.medial_condyle_radius_mm - 4.0,
@@ -203,12 +204,7 @@ Result<FemurParameters> femur_parameters(const BoneRecipe& recipe) {
 }
 
 Femur::Femur(const FemurParameters& parameters, Side side)
-    : p_(parameters),
-      side_(side == Side::left ? 1.0 : -1.0),
-      head_radius_mm_(0.5 * parameters.head_diameter_mm),
-      half_width_({{0.0, 1.0}}),
-      half_depth_({{0.0, 1.0}}),
-      cortex_({{0.0, 1.0}}) {
+    : p_(parameters), side_(side == Side::left ? 1.0 : -1.0), head_radius_mm_(0.5 * parameters.head_diameter_mm) {
   place_shaft();
   place_hip();
   place_trabeculae();
@@ -248,8 +244,7 @@ void Femur::place_shaft() {
 
 void Femur::place_hip() {
   const double angle = p_.neck_shaft_degrees * kRadians, turn = p_.anteversion_degrees * kRadians;
-  neck_ = -std::cos(angle) * up_ +
-          std::sin(angle) * (-std::cos(turn) * lateral_ + std::sin(turn) * Vec3::UnitY());
+  neck_ = -std::cos(angle) * up_ + std::sin(angle) * (-std::cos(turn) * lateral_ + std::sin(turn) * Vec3::UnitY());
   neck_up_ = (up_ - up_.dot(neck_) * neck_).normalized();
   neck_front_ = neck_up_.cross(neck_);
   neck_length_mm_ = p_.offset_mm / std::sin(angle);
@@ -293,8 +288,7 @@ void Femur::place_trabeculae() {
 double Femur::shaft_mm(const Vec3& at) const {
   const double along = along_shaft(at);
   const Vec3 from_centre = at - shaft_centre(along);
-  const double across =
-      ellipse_mm(from_centre.dot(lateral_), from_centre.y(), half_width_(along), half_depth_(along));
+  const double across = ellipse_mm(from_centre.dot(lateral_), from_centre.y(), half_width_(along), half_depth_(along));
   return smooth_max(smooth_max(across, bottom_ - along, kEndBlend), along - top_, kEndBlend);
 }
 
@@ -310,8 +304,7 @@ double Femur::neck_mm(const Vec3& at) const {
 
 double Femur::condyle_mm(const Condyle& condyle, const Vec3& at) const {
   const double half = 0.5 * p_.condyle_width_mm, inner = condyle.radius_mm - half;
-  const double in_plane =
-      round_cone_mm({0.0, at.y(), at.z()}, condyle.posterior, inner, condyle.anterior, inner);
+  const double in_plane = round_cone_mm({0.0, at.y(), at.z()}, condyle.posterior, inner, condyle.anterior, inner);
   return std::hypot(std::max(0.0, in_plane), at.x() - condyle.x) - half;
 }
 
@@ -360,8 +353,7 @@ BoneDepths Femur::depths(const Vec3& at_mm) const {
   BoneDepths depths;
   depths.surface_mm = surface_mm(at);
   depths.cortex_mm = depths.surface_mm + cortex_(along);
-  depths.marrow_mm =
-      std::max({depths.cortex_mm, height_of(p_.marrow_from) - along, along - height_of(p_.marrow_to)});
+  depths.marrow_mm = std::max({depths.cortex_mm, height_of(p_.marrow_from) - along, along - height_of(p_.marrow_to)});
   return depths;
 }
 
@@ -381,8 +373,7 @@ double Femur::cancellous_g_cm3(const Vec3& at_mm) const {
       nearest = std::min(nearest, squared_distance(at, tensile_[i], tensile_[i + 1]));
     const double tensile = group(nearest, 0.16 * head_radius_mm_);
     density += (p_.tensile_g_cm3 - density) * tensile;
-    const double compressive =
-        group(squared_distance(at, compressive_from_, compressive_to_), 0.25 * head_radius_mm_);
+    const double compressive = group(squared_distance(at, compressive_from_, compressive_to_), 0.25 * head_radius_mm_);
     density += (p_.compressive_g_cm3 - density) * compressive;
   }
   return density * (1.0 + p_.texture * grain_noise(at, kGrain_mm));
@@ -394,8 +385,12 @@ BoneAnatomy Femur::anatomy() const {
   const auto axis = [&](const char* name, const Vec3& at, const Vec3& direction) {
     found.axes.push_back({name, world(at), world(direction.normalized())});
   };
-  const auto circle = [](const Condyle& condyle) { return Vec3(condyle.x, condyle.posterior.y(), condyle.posterior.z()); };
-  const auto beyond = [&](const Condyle& condyle, const Vec3& way) { return Vec3(circle(condyle) + condyle.radius_mm * way); };
+  const auto circle = [](const Condyle& condyle) {
+    return Vec3(condyle.x, condyle.posterior.y(), condyle.posterior.z());
+  };
+  const auto beyond = [&](const Condyle& condyle, const Vec3& way) {
+    return Vec3(circle(condyle) + condyle.radius_mm * way);
+  };
   const Vec3 knee = 0.5 * (circle(medial_) + circle(lateral_condyle_));
   const Vec3 medial = epicondyle(medial_), lateral = epicondyle(lateral_condyle_);
   landmark("head centre", head_);
@@ -426,6 +421,7 @@ Box Femur::bounds() const {
     box.include(world(at) + Vec3::Constant(radius));
   };
   include(head_, r);
+  include(neck_base_, 0.75 * p_.neck_height_mm);
   include(trochanter_, kTrochanterSize * r);
   include(trochanter_tip_, kTrochanterTipSize * r);
   include(lesser_, kLesserSize * r);

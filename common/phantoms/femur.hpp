@@ -9,7 +9,8 @@
 
 namespace osteon::phantoms {
 
-// Where along the femur the parameters of its shaft hold, from the plane on which the condyles rest; parts of its length.
+// Where along the femur the parameters of its shaft hold, from the plane on which the condyles rest; parts of its
+// length.
 inline constexpr std::array kFemurStations{0.12, 0.25, 0.40, 0.55, 0.68, 0.80};
 
 // The values are those of the preset "male". deploy/docs/phantoms.md says what each of them is, and its source.
@@ -99,7 +100,7 @@ class Femur final : public PhantomBone {
   double head_radius_mm_;  // often used
   Vec3 up_, lateral_;      // along the shaft, and across it in the coronal plane
   Profile half_width_, half_depth_, cortex_;
-  double bottom_ = 0.0, top_ = 0.0;  // of the shaft, along it
+  double bottom_ = 0.0, top_ = 0.0;               // of the shaft, along it
   Vec3 neck_base_, neck_, neck_up_, neck_front_;  // where its axis meets that of the shaft, and its directions
   double neck_length_mm_ = 0.0;
   Vec3 head_, trochanter_, trochanter_tip_, lesser_, lesser_tip_;  // centres, and the tip of the lesser one

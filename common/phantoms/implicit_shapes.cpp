@@ -11,7 +11,8 @@ namespace {
 
 // A number from -1 to 1 that depends on a lattice point alone: three multiplications and shifts of its coordinates.
 double lattice_noise(std::int64_t x, std::int64_t y, std::int64_t z) {
-  std::uint64_t h = static_cast<std::uint64_t>(x) * 0x9e3779b97f4a7c15u + static_cast<std::uint64_t>(y) * 0xc2b2ae3d27d4eb4fu +
+  std::uint64_t h = static_cast<std::uint64_t>(x) * 0x9e3779b97f4a7c15u +
+                    static_cast<std::uint64_t>(y) * 0xc2b2ae3d27d4eb4fu +
                     static_cast<std::uint64_t>(z) * 0x165667b19e3779f9u;
   h = (h ^ (h >> 31)) * 0xbf58476d1ce4e5b9u;
   h = (h ^ (h >> 29)) * 0x94d049bb133111ebu;

@@ -7,8 +7,9 @@
 
 namespace osteon::phantoms {
 
-// The smaller of two distances, rounded where they differ by less than `blend_mm`: there the solids grow together. Where
-// they differ by more, it is exactly the smaller one. Where both are equal, it is lower by a quarter of `blend_mm`.
+// The smaller of two distances, rounded where they differ by less than `blend_mm`: there the solids grow together.
+// Where they differ by more, it is exactly the smaller one. Where both are equal, it is lower by a quarter of
+// `blend_mm`.
 [[nodiscard]] double smooth_min(double a, double b, double blend_mm);
 [[nodiscard]] inline double smooth_max(double a, double b, double blend_mm) { return -smooth_min(-a, -b, blend_mm); }
 
@@ -18,8 +19,8 @@ namespace osteon::phantoms {
 [[nodiscard]] double round_cone_mm(const Vec3& at, const Vec3& a, double radius_a_mm, const Vec3& b,
                                    double radius_b_mm);
 
-// Distance to an ellipse with half axes a and b, in its plane. Exact on both axes, and everywhere if a = b. Elsewhere it
-// is exact to first order beside the ellipse.
+// Distance to an ellipse with half axes a and b, in its plane. Exact on both axes, and everywhere if a = b. Elsewhere
+// it is exact to first order beside the ellipse.
 [[nodiscard]] double ellipse_mm(double x, double y, double a, double b);
 
 // A curve y(x) through given points, which rises only where they rise: monotone cubic interpolation (Fritsch 1980).
@@ -29,13 +30,14 @@ class Profile {
   struct Point {
     double x = 0.0, y = 0.0;
   };
+  Profile() = default;  // 0 everywhere
   // At least one point, in the order of x, which differ.
   explicit Profile(std::vector<Point> points);
   [[nodiscard]] double operator()(double x) const;
 
  private:
-  std::vector<Point> points_;
-  std::vector<double> slopes_;
+  std::vector<Point> points_ = std::vector<Point>(1);
+  std::vector<double> slopes_ = {0.0};
 };
 
 // 0 up to `from`, 1 beyond `to`, and a smooth rise between them.

@@ -9,9 +9,7 @@ namespace osteon::phantoms {
 namespace {
 
 // The part of a sample of `width_mm` that lies on the negative side of a face.
-double share_beyond(double distance_mm, double width_mm) {
-  return std::clamp(0.5 - distance_mm / width_mm, 0.0, 1.0);
-}
+double share_beyond(double distance_mm, double width_mm) { return std::clamp(0.5 - distance_mm / width_mm, 0.0, 1.0); }
 
 Result<void> check_word(const char* what, const std::string& word, std::span<const std::string_view> known) {
   if (std::ranges::find(known, word) != known.end()) return {};
@@ -40,8 +38,8 @@ double PhantomBone::density_g_cm3(const Vec3& at_mm, double blur_mm) const {
   const double inner = share_beyond(at.cortex_mm, blur_mm);
   if (inner == 0.0) return cortical_g_cm3();
   const double canal = share_beyond(at.marrow_mm, blur_mm);
-  const double within = canal == 1.0 ? marrow_g_cm3()
-                                     : canal * marrow_g_cm3() + (1.0 - canal) * cancellous_g_cm3(at_mm);
+  const double within =
+      canal == 1.0 ? marrow_g_cm3() : canal * marrow_g_cm3() + (1.0 - canal) * cancellous_g_cm3(at_mm);
   return inner * within + (1.0 - inner) * cortical_g_cm3();
 }
 
