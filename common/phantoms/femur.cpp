@@ -11,16 +11,17 @@ namespace {
 
 constexpr double kRadians = std::numbers::pi / 180.0;
 // Widths in which parts grow together, mm. [A]
-constexpr double kNeckBlend = 10.0, kHeadBlend = 5.0, kTrochanterBlend = 8.0, kLesserBlend = 5.0, kCondyleBlend = 10.0,
+constexpr double kNeckBlend = 10.0, kHeadBlend = 4.0, kTrochanterBlend = 8.0, kLesserBlend = 5.0, kCondyleBlend = 10.0,
                  kTrochleaBlend = 6.0, kEpicondyleBlend = 2.5, kEndBlend = 8.0;
 // Sizes of parts without a parameter, as parts of the head's radius or of the medial condyle's. [A], by the look of
 // real bones.
 constexpr double kTrochanterSize = 0.62, kTrochanterTipSize = 0.42, kLesserSize = 0.45, kLesserProminence = 0.33;
 constexpr double kEpicondyleSize = 0.45, kTrochleaSize = 0.7, kGroove = 0.25, kCondyleLift = 0.15;
-constexpr double kIsthmus = 0.58;     // where the neck is narrowest, as a part of its length from the shaft
+constexpr double kIsthmus = 0.52;     // where the neck is narrowest, as a part of its length from the shaft
 constexpr double kNeckFlare = 1.3;    // how much it widens towards the shaft
 constexpr double kLesserTurn = 45.0;  // degrees by which the lesser trochanter lies behind medial
-constexpr double kGrain_mm = 1.5;     // of the texture
+constexpr double kFlarePart = 0.09, kFlareWidth = 1.3, kFlareDepth = 1.12;  // of the shaft above the condyles
+constexpr double kGrain_mm = 1.5;                                           // of the texture
 
 using Field = ParameterField<FemurParameters>;
 using P = FemurParameters;
@@ -40,9 +41,9 @@ constexpr Field kFields[] = {
     {"shaft_forward_mm", &P::shaft_forward_mm, 20.0, 45.0},
     {"bow_radius_mm", &P::bow_radius_mm, 500.0, 2500.0},
     {"bow_apex", &P::bow_apex, 0.3, 0.6},
-    {"width_12_mm", &P::width_12_mm, 34.0, 68.0},
-    {"depth_12_mm", &P::depth_12_mm, 28.0, 52.0},
-    {"cortex_12_mm", &P::cortex_12_mm, 1.0, 6.0},
+    {"width_15_mm", &P::width_15_mm, 26.0, 58.0},
+    {"depth_15_mm", &P::depth_15_mm, 24.0, 50.0},
+    {"cortex_15_mm", &P::cortex_15_mm, 1.0, 6.0},
     {"width_25_mm", &P::width_25_mm, 20.0, 44.0},
     {"depth_25_mm", &P::depth_25_mm, 20.0, 44.0},
     {"cortex_25_mm", &P::cortex_25_mm, 1.5, 9.0},
@@ -82,7 +83,7 @@ struct Station {
   double P::*cortex;
 };
 constexpr Station kStations[] = {
-    {"cortex_12_mm", &P::width_12_mm, &P::depth_12_mm, &P::cortex_12_mm},
+    {"cortex_15_mm", &P::width_15_mm, &P::depth_15_mm, &P::cortex_15_mm},
     {"cortex_25_mm", &P::width_25_mm, &P::depth_25_mm, &P::cortex_25_mm},
     {"cortex_40_mm", &P::width_40_mm, &P::depth_40_mm, &P::cortex_40_mm},
     {"cortex_55_mm", &P::width_55_mm, &P::depth_55_mm, &P::cortex_55_mm},
@@ -137,10 +138,11 @@ double squared_distance(const Vec3& at, const Vec3& a, const Vec3& b) {
   return squared_distance_to_segment<double>(at, a, b);
 }
 
-Profile profile_of(const std::array<double, kFemurStations.size()>& along, const FemurParameters& p,
-                   double P::*Station::*member, double factor) {
-  std::vector<Profile::Point> points;
-  for (std::size_t i = 0; i < along.size(); ++i) points.push_back({along[i], factor * (p.*(kStations[i].*member))});
+// Half of a width along the shaft. It is `flare` times as large at `flare_along`, below the first station.
+Profile half_profile(const std::array<double, kFemurStations.size()>& along, const FemurParameters& p,
+                     double P::*Station::*member, double flare_along, double flare) {
+  std::vector<Profile::Point> points{{flare_along, 0.5 * flare * (p.*(kStations[0].*member))}};
+  for (std::size_t i = 0; i < along.size(); ++i) points.push_back({along[i], 0.5 * (p.*(kStations[i].*member))});
   return Profile(std::move(points));
 }
 
@@ -178,7 +180,7 @@ Result<void> check_femur(const FemurParameters& p) {
        "offset_mm, head_diameter_mm and width_80_mm"},
       {"lateral_condyle_radius_mm", p.lateral_condyle_radius_mm, p.medial_condyle_radius_mm - 4.0,
        p.medial_condyle_radius_mm + 4.0, "medial_condyle_radius_mm"},
-      {"condyle_width_mm", p.condyle_width_mm, 0.0, 1.8 * small, "the condyles' radii"},
+      {"condyle_width_mm", p.condyle_width_mm, 0.0, 1.5 * small, "the condyles' radii"},
       {"condyle_depth_mm", p.condyle_depth_mm, 2.3 * large, 3.8 * small, "the condyles' radii"},
       {"bicondylar_width_mm", p.bicondylar_width_mm, condyles_mm + 2.0 * kEpicondyleBlend, condyles_mm + 20.0,
        "notch_width_mm and condyle_width_mm"},
@@ -226,8 +228,8 @@ void Femur::place_shaft() {
   lateral_ = {std::cos(valgus), 0.0, -std::sin(valgus)};
   std::array<double, kFemurStations.size()> along{};
   for (std::size_t i = 0; i < along.size(); ++i) along[i] = height_of(kFemurStations[i]);
-  half_width_ = profile_of(along, p_, &Station::width, 0.5);
-  half_depth_ = profile_of(along, p_, &Station::depth, 0.5);
+  half_width_ = half_profile(along, p_, &Station::width, height_of(kFlarePart), kFlareWidth);
+  half_depth_ = half_profile(along, p_, &Station::depth, height_of(kFlarePart), kFlareDepth);
   std::vector<Profile::Point> cortex{{height_of(0.04), p_.shell_mm}};
   for (std::size_t i = 0; i < along.size(); ++i) cortex.push_back({along[i], p_.*kStations[i].cortex});
   cortex.push_back({height_of(0.9), p_.shell_mm});
@@ -239,7 +241,7 @@ void Femur::place_shaft() {
   const double x = 0.5 * (p_.notch_width_mm + p_.condyle_width_mm);
   medial_ = {-x, r, Vec3::Zero(), {0.0, p_.condyle_depth_mm - 2.0 * r, kCondyleLift * r}};
   lateral_condyle_ = {x, l, {0.0, l - r, l - r}, {0.0, p_.condyle_depth_mm - r - l, l - r + kCondyleLift * l}};
-  bottom_ = 0.2 * r;
+  bottom_ = 0.35 * r;
 }
 
 void Femur::place_hip() {
@@ -363,7 +365,7 @@ double Femur::cancellous_g_cm3(const Vec3& at_mm) const {
   // Densest at the ends; it thins out towards the marrow.
   const double near_end = std::max(1.0 - smooth_step(along, height_of(0.08), height_of(p_.marrow_from)),
                                    smooth_step(along, height_of(p_.marrow_to), height_of(0.88)));
-  double density = p_.cancellous_g_cm3 * (0.45 + 0.55 * near_end);
+  double density = p_.cancellous_g_cm3 * (0.7 + 0.3 * near_end);
   if (along > height_of(0.7)) {
     const auto group = [&](double squared_mm2, double width_mm) {
       return std::exp(-0.5 * squared_mm2 / (width_mm * width_mm));

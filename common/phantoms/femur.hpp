@@ -11,7 +11,7 @@ namespace osteon::phantoms {
 
 // Where along the femur the parameters of its shaft hold, from the plane on which the condyles rest; parts of its
 // length.
-inline constexpr std::array kFemurStations{0.12, 0.25, 0.40, 0.55, 0.68, 0.80};
+inline constexpr std::array kFemurStations{0.15, 0.25, 0.40, 0.55, 0.68, 0.80};
 
 // The values are those of the preset "male". deploy/docs/phantoms.md says what each of them is, and its source.
 struct FemurParameters {
@@ -29,7 +29,7 @@ struct FemurParameters {
   double shaft_forward_mm = 32.0;
   double bow_radius_mm = 943.0;
   double bow_apex = 0.42;
-  double width_12_mm = 51.0, depth_12_mm = 40.0, cortex_12_mm = 2.2;
+  double width_15_mm = 40.0, depth_15_mm = 35.5, cortex_15_mm = 2.6;
   double width_25_mm = 31.5, depth_25_mm = 32.0, cortex_25_mm = 4.4;
   double width_40_mm = 27.5, depth_40_mm = 30.0, cortex_40_mm = 6.6;
   double width_55_mm = 28.0, depth_55_mm = 29.6, cortex_55_mm = 7.1;
@@ -45,7 +45,7 @@ struct FemurParameters {
   double cortical_g_cm3 = 1.9;
   double cancellous_g_cm3 = 0.22;
   double compressive_g_cm3 = 0.58, tensile_g_cm3 = 0.40;
-  double marrow_g_cm3 = 0.1;
+  double marrow_g_cm3 = 0.08;
   double texture = 0.1;
 };
 

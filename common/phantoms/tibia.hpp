@@ -32,7 +32,7 @@ struct TibiaParameters {
   double gap_mm = 2.5;
   double cortical_g_cm3 = 1.9;
   double cancellous_g_cm3 = 0.23;
-  double marrow_g_cm3 = 0.1;
+  double marrow_g_cm3 = 0.08;
   double texture = 0.1;
 };
 
