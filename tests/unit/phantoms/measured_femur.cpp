@@ -21,7 +21,6 @@ std::vector<Vec3> those(const std::vector<Vec3>& points, Keep keep) {
   return kept;
 }
 
-// The largest value over points; the mean of the few that are as large within a tenth of a millimetre.
 template <class Value>
 double largest(const std::vector<Vec3>& points, Value value) {
   double most = -std::numeric_limits<double>::infinity();
