@@ -25,9 +25,9 @@ struct NamedValue {
 struct BoneRecipe {
   std::string kind = "femur";
   Side side = Side::left;
-  std::string preset = "male";            // female, male, small, large
-  std::string condition = "adult";        // young, adult, osteoporotic
-  std::map<std::string, double> changes;  // of the preset's parameters, by name
+  std::string preset = "male";                 // female, male, small, large
+  std::string condition = "adult";             // young, adult, osteoporotic
+  std::map<std::string, double> changes = {};  // of the preset's parameters, by name
 };
 
 // Tissue at a point. Marrow fills the medullary canal.

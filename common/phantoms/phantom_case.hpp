@@ -13,7 +13,7 @@ namespace osteon::phantoms {
 struct PhantomCaseOptions {
   double pitch_mm = 0.5;
   std::string title = "Phantom";
-  DensityCalibration calibration;                  // from HU to density, for the HU of the scan
+  DensityCalibration calibration = {};             // from HU to density, for the HU of the scan
   std::pair<double, double> hu = {-1000.0, 40.0};  // of air, the least, and of the soft tissue around the bone
 };
 
