@@ -155,7 +155,7 @@ Result<void> check_femur(const FemurParameters& p) {
     if (const double value = p.*field.value; !(value >= field.least && value <= field.most))
       return bad_parameter(field.name, value, field.least, field.most);
   for (const Station& s : kStations)
-    if (auto fits = check_beside(s.name, p.*s.cortex, 0.0, 0.42 * std::min(p.*s.width, p.*s.depth),
+    if (auto fits = check_beside(s.name, p.*s.cortex, 0.0, 0.38 * std::min(p.*s.width, p.*s.depth),
                                  "the shaft's width and depth there");
         !fits)
       return fits;

@@ -1,6 +1,7 @@
 #include "common/phantoms/phantom_bone.hpp"
 
 #include <algorithm>
+#include <span>
 
 #include "common/phantoms/femur.hpp"
 #include "common/phantoms/tibia.hpp"

@@ -100,7 +100,7 @@ Result<void> check_tibia(const TibiaParameters& p) {
     if (const double value = p.*field.value; !(value >= field.least && value <= field.most))
       return bad_parameter(field.name, value, field.least, field.most);
   for (const TibiaStation& s : kTibiaRows)
-    if (const double most = 0.42 * std::min(p.*s.width, p.*s.depth); p.*s.cortex > most)
+    if (const double most = 0.38 * std::min(p.*s.width, p.*s.depth); p.*s.cortex > most)
       return bad_input(limits(s.name, p.*s.cortex, 0.0, most, "the shaft's width and depth there"));
   struct Row {
     const char* name;

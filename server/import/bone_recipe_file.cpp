@@ -3,6 +3,7 @@
 #include <yaml-cpp/yaml.h>
 
 #include <algorithm>
+#include <span>
 
 #include "common/core/bounded_text.hpp"
 #include "server/import/yaml_fields.hpp"

@@ -13,7 +13,7 @@ namespace osteon::import {
 
 struct ScannerSettings {
   double pixel_mm = 0.7;
-  std::vector<double> gaps_mm;             // between slices along their normal, the table's way
+  std::vector<double> gaps_mm = {};        // between slices along their normal, the table's way
   double thickness_mm = 1.0;               // of a slice: HU are its mean
   double blur_mm = 0.4;                    // sigma of the scanner's point spread function, the same along all axes
   double noise_hu = 25.0;                  // standard deviation, independent for each voxel

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <numbers>
 
 #include "common/geometry/mesh_file.hpp"
 #include "common/geometry/triangle_distance.hpp"

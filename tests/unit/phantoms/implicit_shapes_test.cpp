@@ -56,7 +56,8 @@ TEST(Profile, GoesThroughItsPointsAndNeverOvershoots) {
   const Profile profile({{0, 1}, {2, 5}, {3, 5}, {7, 2}, {8, -1}});
   EXPECT_EQ(profile(-4), 1.0);
   EXPECT_EQ(profile(9), -1.0);
-  for (const auto& [x, y] : {std::pair{0, 1}, {2, 5}, {3, 5}, {7, 2}, {8, -1}}) EXPECT_NEAR(profile(x), y, 1e-12);
+  const std::vector<Profile::Point> points{{0, 1}, {2, 5}, {3, 5}, {7, 2}, {8, -1}};
+  for (const auto& [x, y] : points) EXPECT_NEAR(profile(x), y, 1e-12);
   double last = profile(0);
   for (double x = 0.0; x <= 8.0; x += 0.01) {
     const double y = profile(x);

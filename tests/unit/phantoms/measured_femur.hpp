@@ -22,8 +22,8 @@ class BoneView {
   [[nodiscard]] std::vector<Vec3> surface_points() const;
   // How far it is from a point in the bone to the surface.
   [[nodiscard]] double reach_mm(const Vec3& from, const Vec3& direction) const;
-  // Thickness of the cortex from the surface inwards, along a line from a point deep in the bone. `level_g_cm3`: the
-  // density at its inner face; 0: half way between cortex and what is 3 mm deeper.
+  // Thickness of the cortex, along a line from a point deep in the bone outwards. At its inner face, the density is
+  // half way between that of cortex and what is 3 mm deeper.
   [[nodiscard]] double cortex_mm(const Vec3& from, const Vec3& direction, double thickest_mm) const;
 
  private:
