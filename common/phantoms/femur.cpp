@@ -40,7 +40,7 @@ constexpr Field kFields[] = {
     {"shaft_lateral_mm", &P::shaft_lateral_mm, -6.0, 8.0},
     {"shaft_forward_mm", &P::shaft_forward_mm, 20.0, 45.0},
     {"bow_radius_mm", &P::bow_radius_mm, 500.0, 2500.0},
-    {"bow_apex", &P::bow_apex, 0.3, 0.6},
+    {"bow_apex", &P::bow_apex, 0.15, 0.7},
     {"width_15_mm", &P::width_15_mm, 26.0, 58.0},
     {"depth_15_mm", &P::depth_15_mm, 24.0, 50.0},
     {"cortex_15_mm", &P::cortex_15_mm, 1.0, 6.0},
@@ -53,9 +53,9 @@ constexpr Field kFields[] = {
     {"width_55_mm", &P::width_55_mm, 18.0, 40.0},
     {"depth_55_mm", &P::depth_55_mm, 18.0, 42.0},
     {"cortex_55_mm", &P::cortex_55_mm, 2.0, 11.0},
-    {"width_68_mm", &P::width_68_mm, 18.0, 42.0},
-    {"depth_68_mm", &P::depth_68_mm, 18.0, 42.0},
-    {"cortex_68_mm", &P::cortex_68_mm, 2.0, 11.0},
+    {"width_74_mm", &P::width_74_mm, 18.0, 42.0},
+    {"depth_74_mm", &P::depth_74_mm, 18.0, 42.0},
+    {"cortex_74_mm", &P::cortex_74_mm, 2.0, 11.0},
     {"width_80_mm", &P::width_80_mm, 20.0, 48.0},
     {"depth_80_mm", &P::depth_80_mm, 18.0, 44.0},
     {"cortex_80_mm", &P::cortex_80_mm, 1.5, 9.0},
@@ -87,7 +87,7 @@ constexpr Station kStations[] = {
     {"cortex_25_mm", &P::width_25_mm, &P::depth_25_mm, &P::cortex_25_mm},
     {"cortex_40_mm", &P::width_40_mm, &P::depth_40_mm, &P::cortex_40_mm},
     {"cortex_55_mm", &P::width_55_mm, &P::depth_55_mm, &P::cortex_55_mm},
-    {"cortex_68_mm", &P::width_68_mm, &P::depth_68_mm, &P::cortex_68_mm},
+    {"cortex_74_mm", &P::width_74_mm, &P::depth_74_mm, &P::cortex_74_mm},
     {"cortex_80_mm", &P::width_80_mm, &P::depth_80_mm, &P::cortex_80_mm},
 };
 static_assert(std::size(kStations) == kFemurStations.size());
@@ -262,12 +262,17 @@ void Femur::place_hip() {
                  neck_base_.z() + 0.1 * radius};
   trochanter_tip_ = {trochanter_.x() - 0.2 * radius, neck_base_.y() - 0.55 * radius,
                      trochanter_z - kTrochanterTipSize * radius};
-  const double along = along_at(trochanter_z - p_.trochanters_mm);
+  // The lesser trochanter stands on the shaft. Its tip is a little higher than the shaft's axis there, and how far away
+  // depends on the shaft's section.
   const double behind = kLesserTurn * kRadians;
   const Vec3 out = -std::cos(behind) * lateral_ - std::sin(behind) * Vec3::UnitY();
-  const double shaft = 1.0 / std::hypot(std::cos(behind) / half_width_(along), std::sin(behind) / half_depth_(along));
-  const double tip = shaft + kLesserProminence * radius;
-  lesser_tip_ = shaft_centre(along) + tip * out;
+  double tip = 0.0;
+  for (int round = 0; round < 20; ++round) {
+    const double along = along_at(trochanter_z - p_.trochanters_mm - tip * out.z());
+    const double shaft = 1.0 / std::hypot(std::cos(behind) / half_width_(along), std::sin(behind) / half_depth_(along));
+    tip = shaft + kLesserProminence * radius;
+    lesser_tip_ = shaft_centre(along) + tip * out;
+  }
   lesser_ = lesser_tip_ - kLesserSize * radius * out;
 }
 

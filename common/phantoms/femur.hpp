@@ -11,7 +11,7 @@ namespace osteon::phantoms {
 
 // Where along the femur the parameters of its shaft hold, from the plane on which the condyles rest; parts of its
 // length.
-inline constexpr std::array kFemurStations{0.15, 0.25, 0.40, 0.55, 0.68, 0.80};
+inline constexpr std::array kFemurStations{0.15, 0.25, 0.40, 0.55, 0.74, 0.80};
 
 // The values are those of the preset "male". deploy/docs/phantoms.md says what each of them is, and its source.
 struct FemurParameters {
@@ -33,7 +33,7 @@ struct FemurParameters {
   double width_25_mm = 31.5, depth_25_mm = 32.0, cortex_25_mm = 4.4;
   double width_40_mm = 27.5, depth_40_mm = 30.0, cortex_40_mm = 6.6;
   double width_55_mm = 28.0, depth_55_mm = 29.6, cortex_55_mm = 7.1;
-  double width_68_mm = 29.0, depth_68_mm = 29.0, cortex_68_mm = 6.6;
+  double width_74_mm = 29.0, depth_74_mm = 29.0, cortex_74_mm = 6.6;
   double width_80_mm = 33.0, depth_80_mm = 31.0, cortex_80_mm = 4.6;
   double shell_mm = 1.6;
   double marrow_from = 0.25, marrow_to = 0.76;

@@ -137,12 +137,12 @@ SectionMoments section_of(const TriangleMesh& mesh, const Pose& to_bone, const V
 
 SectionMoments section_of(const Femur& bone, const Vec3& up, const Vec3& across, double along) {
   const Vec3 front = up.cross(across);
-  constexpr double kStep_mm = 0.25;
+  constexpr double kGrid_mm = 0.25;
   double area = 0.0, sx = 0.0, sy = 0.0, sxx = 0.0, syy = 0.0;
-  for (double x = -60.0; x <= 60.0; x += kStep_mm)
-    for (double y = -60.0; y <= 60.0; y += kStep_mm) {
+  for (double x = -60.0; x <= 60.0; x += kGrid_mm)
+    for (double y = -60.0; y <= 60.0; y += kGrid_mm) {
       const double s = bone.depths(along * up + x * across + y * front).surface_mm;
-      const double part = kStep_mm * kStep_mm * std::clamp(0.5 - s / kStep_mm, 0.0, 1.0);
+      const double part = kGrid_mm * kGrid_mm * std::clamp(0.5 - s / kGrid_mm, 0.0, 1.0);
       area += part;
       sx += part * x;
       sy += part * y;
@@ -150,6 +150,19 @@ SectionMoments section_of(const Femur& bone, const Vec3& up, const Vec3& across,
       syy += part * y * y;
     }
   return {area, sxx - sx * sx / area, syy - sy * sy / area};
+}
+
+// Middles of triangles, about as many on every part of the area.
+std::vector<Vec3> spread_points(const TriangleMesh& mesh, int count) {
+  std::vector<Vec3> points;
+  const double step = area_mm2(mesh) / count;
+  double passed = 0.5 * step;
+  for (const auto& t : mesh.triangles) {
+    const Vec3 a = position(mesh, t[0]), b = position(mesh, t[1]), c = position(mesh, t[2]);
+    passed += 0.5 * (b - a).cross(c - a).norm();
+    for (; passed >= step; passed -= step) points.emplace_back((a + b + c) / 3.0);
+  }
+  return points;
 }
 
 double distance_to_mesh_mm(const TriangleMesh& mesh, const Vec3& at) {
@@ -202,18 +215,15 @@ TEST(FemurFit, APhantomComesWithinThreeMillimetresOfARealFemur) {
   const auto count = static_cast<Eigen::Index>(fields.size());
   Eigen::VectorXd values = Eigen::VectorXd::Zero(count + 6);
   for (std::size_t i = 0; i < fields.size(); ++i) values[static_cast<Eigen::Index>(i)] = start.*fields[i].value;
+  const std::vector<Vec3> points = spread_points(*mesh, 3000);
   Vec3 knee = Vec3::Zero();
-  std::vector<Vec3> points;
   int low = 0;
   double back = -1e9;
-  for (std::uint32_t i = 0; i < mesh->positions_mm.size(); ++i) {
-    const Vec3 p = position(*mesh, i);
-    if (p.z() < box.min_mm.z() + 0.1 * length) {
-      knee += p;
-      ++low;
-      back = std::max(back, p.y());
-    }
-    if (i % 4 == 0) points.push_back(p);
+  for (const Vec3& p : points) {
+    if (p.z() > box.min_mm.z() + 0.1 * length) continue;
+    knee += p;
+    ++low;
+    back = std::max(back, p.y());
   }
   const double radius = start.medial_condyle_radius_mm;
   values.tail<3>() = Vec3(knee.x() / low, back - radius, box.min_mm.z() + radius);
@@ -227,10 +237,8 @@ TEST(FemurFit, APhantomComesWithinThreeMillimetresOfARealFemur) {
   const auto good = check_femur(found);
   EXPECT_TRUE(good) << good.error().message;
 
-  // Both ways: from the mesh's corners to the phantom, and from the phantom to the mesh.
-  std::vector<Vec3> all;
-  for (std::uint32_t i = 0; i < mesh->positions_mm.size(); ++i) all.push_back(position(*mesh, i));
-  const double to_phantom = distances_mm(femur, all).cwiseAbs().mean();
+  // Both ways: from the mesh to the phantom, and from the phantom to the mesh.
+  const double to_phantom = distances_mm(femur, spread_points(*mesh, 20000)).cwiseAbs().mean();
   const auto surface = points_on(femur.bone, 1000);
   double to_mesh = 0.0;
   for (const Vec3& p : surface) to_mesh += distance_to_mesh_mm(*mesh, femur.pose_mesh_bone.point(p)) / 1000.0;

@@ -12,7 +12,7 @@ namespace osteon::phantoms {
 namespace {
 
 constexpr double kDegrees = 180.0 / std::numbers::pi;
-constexpr double kStep_mm = 0.1;
+constexpr double kRayStep_mm = 0.1;
 
 template <class Keep>
 std::vector<Vec3> those(const std::vector<Vec3>& points, Keep keep) {
@@ -240,7 +240,7 @@ void measure_inside(const BoneView& bone, const std::vector<Vec3>& points, const
                     double length, MeasuredFemur& found) {
   auto& v = found.values;
   const auto along_at = [&](double part) { return (bottom + part * length) / shaft.up.z(); };
-  const char* names[] = {"15", "25", "40", "55", "68", "80"};
+  const char* names[] = {"15", "25", "40", "55", "74", "80"};
   for (std::size_t i = 0; i < kFemurStations.size(); ++i) {
     const std::string at = std::string("_") + names[i] + "_mm";
     const double middle = along_at(kFemurStations[i]);
@@ -335,10 +335,10 @@ std::vector<Vec3> BoneView::surface_points() const {
 double BoneView::reach_mm(const Vec3& from, const Vec3& direction) const {
   double away = 0.0, inside = surface_mm(from);
   while (away < 200.0) {
-    const double next = surface_mm(from + (away + kStep_mm) * direction);
-    if (next >= 0.0) return away + kStep_mm * inside / (inside - next);
+    const double next = surface_mm(from + (away + kRayStep_mm) * direction);
+    if (next >= 0.0) return away + kRayStep_mm * inside / (inside - next);
     inside = next;
-    away += kStep_mm;
+    away += kRayStep_mm;
   }
   return away;
 }

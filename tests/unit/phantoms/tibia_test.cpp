@@ -66,10 +66,10 @@ TEST(Tibia, EveryPresetIsATibiaWhoseBonesDoNotTouch) {
       ASSERT_TRUE(bone) << preset << ": " << bone.error().message;
       // Beside every sample of the fibula there is no sample of the tibia.
       const Box box = (*bone)->bounds();
-      constexpr double kStep_mm = 2.0;
-      for (double x = box.min_mm.x(); x < box.max_mm.x(); x += kStep_mm)
-        for (double y = box.min_mm.y(); y < box.max_mm.y(); y += kStep_mm)
-          for (double z = box.min_mm.z(); z < box.max_mm.z(); z += kStep_mm) {
+      constexpr double kCoarse_mm = 2.0;
+      for (double x = box.min_mm.x(); x < box.max_mm.x(); x += kCoarse_mm)
+        for (double y = box.min_mm.y(); y < box.max_mm.y(); y += kCoarse_mm)
+          for (double z = box.min_mm.z(); z < box.max_mm.z(); z += kCoarse_mm) {
             const BoneDepths at = (*bone)->depths({x, y, z});
             if (at.surface_mm > 0.0 || at.bone == 1) continue;
             const double beside_mm = 1.0;
