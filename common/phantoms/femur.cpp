@@ -20,8 +20,8 @@ constexpr double kEpicondyleSize = 0.45, kTrochleaSize = 0.7, kGroove = 0.25, kC
 constexpr double kIsthmus = 0.52;     // where the neck is narrowest, as a part of its length from the shaft
 constexpr double kNeckFlare = 1.3;    // how much it widens towards the shaft
 constexpr double kLesserTurn = 45.0;  // degrees by which the lesser trochanter lies behind medial
-constexpr double kFlarePart = 0.09, kFlareWidth = 1.3, kFlareDepth = 1.12;  // of the shaft above the condyles
-constexpr double kGrain_mm = 1.5;                                           // of the texture
+constexpr double kFlarePart = 0.09, kFlareWidth = 1.3, kFlareDepth = 1.0;  // of the shaft above the condyles
+constexpr double kGrain_mm = 1.5;                                          // of the texture
 
 using Field = ParameterField<FemurParameters>;
 using P = FemurParameters;
@@ -38,7 +38,7 @@ constexpr Field kFields[] = {
     {"trochanters_mm", &P::trochanters_mm, 42.0, 98.0},
     {"shaft_valgus_degrees", &P::shaft_valgus_degrees, 2.0, 13.0},
     {"shaft_lateral_mm", &P::shaft_lateral_mm, -6.0, 8.0},
-    {"shaft_forward_mm", &P::shaft_forward_mm, 20.0, 45.0},
+    {"shaft_forward_mm", &P::shaft_forward_mm, 10.0, 45.0},
     {"bow_radius_mm", &P::bow_radius_mm, 500.0, 2500.0},
     {"bow_apex", &P::bow_apex, 0.15, 0.7},
     {"width_15_mm", &P::width_15_mm, 26.0, 58.0},
@@ -167,6 +167,10 @@ Result<void> check_femur(const FemurParameters& p) {
       (0.5 * p.width_80_mm + 0.55 * p.head_diameter_mm) * std::sin(p.neck_shaft_degrees * kRadians);
   // Where the lateral face of the shaft would be beside the neck, as far from the medial face of the head.
   const double beside_mm = p.offset_mm + 0.5 * p.head_diameter_mm + 0.5 * p.width_80_mm;
+  // The shaft ends behind the front of the condyles.
+  const double from_apex_mm = (p.bow_apex - kFlarePart) * p.length_mm;
+  const double front_mm = p.condyle_depth_mm - p.medial_condyle_radius_mm - 0.5 * kFlareDepth * p.depth_15_mm +
+                          from_apex_mm * from_apex_mm / (2.0 * p.bow_radius_mm);
   struct Row {
     const char* name;
     double value, least, most;
@@ -184,6 +188,8 @@ Result<void> check_femur(const FemurParameters& p) {
       {"condyle_depth_mm", p.condyle_depth_mm, 2.3 * large, 3.8 * small, "the condyles' radii"},
       {"bicondylar_width_mm", p.bicondylar_width_mm, condyles_mm + 2.0 * kEpicondyleBlend, condyles_mm + 20.0,
        "notch_width_mm and condyle_width_mm"},
+      {"shaft_forward_mm", p.shaft_forward_mm, front_mm - 22.0, front_mm + 2.0,
+       "condyle_depth_mm, depth_15_mm and the bow"},
       {"trochanters_mm", p.trochanters_mm, 1.1 * p.head_diameter_mm, 0.24 * p.length_mm,
        "head_diameter_mm and length_mm"},
   };
@@ -370,7 +376,7 @@ double Femur::cancellous_g_cm3(const Vec3& at_mm) const {
   // Densest at the ends; it thins out towards the marrow.
   const double near_end = std::max(1.0 - smooth_step(along, height_of(0.08), height_of(p_.marrow_from)),
                                    smooth_step(along, height_of(p_.marrow_to), height_of(0.88)));
-  double density = p_.cancellous_g_cm3 * (0.7 + 0.3 * near_end);
+  double density = p_.cancellous_g_cm3 * (0.85 + 0.15 * near_end);
   if (along > height_of(0.7)) {
     const auto group = [&](double squared_mm2, double width_mm) {
       return std::exp(-0.5 * squared_mm2 / (width_mm * width_mm));

@@ -26,7 +26,7 @@ struct FemurParameters {
   double trochanters_mm = 67.2;
   double shaft_valgus_degrees = 7.0;
   double shaft_lateral_mm = 3.0;
-  double shaft_forward_mm = 32.0;
+  double shaft_forward_mm = 29.0;
   double bow_radius_mm = 943.0;
   double bow_apex = 0.42;
   double width_15_mm = 40.0, depth_15_mm = 35.5, cortex_15_mm = 2.6;

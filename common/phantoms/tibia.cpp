@@ -227,7 +227,7 @@ double Tibia::cancellous_g_cm3(const Vec3& at_mm) const {
   // Densest below the plateau and above the ankle; it thins out towards the marrow.
   const double near_end = std::max(1.0 - smooth_step(at.z(), height_of(0.08), height_of(p_.marrow_from)),
                                    smooth_step(at.z(), height_of(p_.marrow_to), height_of(0.92)));
-  return p_.cancellous_g_cm3 * (0.7 + 0.3 * near_end) * (1.0 + p_.texture * grain_noise(at, kTibiaGrain_mm));
+  return p_.cancellous_g_cm3 * (0.85 + 0.15 * near_end) * (1.0 + p_.texture * grain_noise(at, kTibiaGrain_mm));
 }
 
 BoneAnatomy Tibia::anatomy() const {

@@ -85,9 +85,13 @@ Eigen::VectorXd fitted(Eigen::VectorXd values, const FemurParameters& start, con
       Eigen::MatrixXd damped = normal;
       damped.diagonal() += damping * normal.diagonal();
       Eigen::VectorXd next = values - damped.ldlt().solve(down);
+      double thickest_neck = 0.0;
       for (std::size_t i = 0; i < fields.size(); ++i) {
         double& value = next[static_cast<Eigen::Index>(i)];
         value = std::clamp(value, fields[i].least, fields[i].most);
+        // The neck is thinner than the head, which comes before it.
+        if (fields[i].name == "head_diameter_mm") thickest_neck = 0.9 * value;
+        if (fields[i].name == "neck_height_mm") value = std::min(value, thickest_neck);
       }
       const double found = cost(next);
       if (found < best) {

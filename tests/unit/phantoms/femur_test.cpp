@@ -185,6 +185,7 @@ TEST(Femur, ImpossibleParametersAreOneSentenceThatNamesThemAndTheirRange) {
   refused("cortex_55_mm", 11.0, "the shaft's width");
   refused("condyle_width_mm", 35.0, "radii");
   refused("bicondylar_width_mm", 60.0, "notch_width_mm");
+  refused("shaft_forward_mm", 44.0, "condyle_depth_mm");
   refused("no_such_mm", 1.0, "length_mm");
 }
 
@@ -240,7 +241,9 @@ TEST(Femur, TwoHundredRandomFemursAreOneClosedPieceEach) {
     ASSERT_FALSE(touches) << "set " << made;
     // Head, trochanters and condyles are there, and the canal is open.
     for (const Landmark& found : (*bone)->anatomy().landmarks)
-      EXPECT_LT((*bone)->depths(found.point_mm).surface_mm, 0.6) << found.name << ", set " << made;
+      if (found.name != "knee centre") {  // in the notch
+        EXPECT_LT((*bone)->depths(found.point_mm).surface_mm, 0.6) << found.name << ", set " << made;
+      }
     EXPECT_EQ((*bone)->tissue(axis(**bone, "anatomical axis").point_mm), BoneTissue::marrow) << "set " << made;
   }
 }

@@ -150,10 +150,9 @@ void measure_hip(const BoneView& bone, const std::vector<Vec3>& points, const Sh
   const double tip = largest(beside, [](const Vec3& p) { return p.z(); });
   v["trochanter_height_mm"] = tip - head.centre.z();
 
-  // The lesser trochanter: where the shaft is farthest behind and medial of its axis.
-  const auto beyond = [&](const Vec3& p) {
-    return (p - shaft.centre(p.dot(shaft.up))).dot((-shaft.lateral - Vec3::UnitY()).normalized());
-  };
+  // The lesser trochanter: where the bone is farthest behind and medial, across the shaft.
+  const Vec3 out = (-shaft.lateral - Vec3::UnitY()).normalized();
+  const auto beyond = [&](const Vec3& p) { return p.dot(out); };
   const auto near = those(points, [&](const Vec3& p) {
     return p.z() < base.z() - 0.5 * head.radius && p.z() > bottom + 0.68 * length &&
            std::abs((p - shaft.centre(p.dot(shaft.up))).dot((shaft.lateral - Vec3::UnitY()).normalized())) < 4.0;
@@ -244,13 +243,20 @@ void measure_inside(const BoneView& bone, const std::vector<Vec3>& points, const
   for (std::size_t i = 0; i < kFemurStations.size(); ++i) {
     const std::string at = std::string("_") + names[i] + "_mm";
     const double middle = along_at(kFemurStations[i]);
-    v["width" + at] = 2.0 * bone.reach_mm(shaft.centre(middle), shaft.lateral);
-    v["depth" + at] = 2.0 * bone.reach_mm(shaft.centre(middle), Vec3::UnitY());
+    // Neck, trochanters and condyles only add to the shaft, so the side without them counts.
+    const auto nearer = [&](const Vec3& way) {
+      const double ahead = bone.reach_mm(shaft.centre(middle), way), back = bone.reach_mm(shaft.centre(middle), -way);
+      return ahead <= back ? std::pair(ahead, way) : std::pair(back, Vec3(-way));
+    };
+    const auto [half_width, across] = nearer(shaft.lateral);
+    const auto [half_depth, front] = nearer(Vec3::UnitY());
+    v["width" + at] = 2.0 * half_width;
+    v["depth" + at] = 2.0 * half_depth;
     double sum = 0.0;
     int count = 0;
     for (double off = -3.0; off <= 3.0; off += 0.5)
       for (double turn = -8.0; turn <= 8.0; turn += 2.0)
-        for (const Vec3& way : {shaft.lateral, Vec3(Vec3::UnitY())}) {
+        for (const Vec3& way : {across, front}) {
           const Vec3 turned = Eigen::AngleAxisd(turn / kDegrees, shaft.up) * way;
           sum += bone.cortex_mm(shaft.centre(middle + off), turned, 0.45 * v["width" + at]);
           ++count;

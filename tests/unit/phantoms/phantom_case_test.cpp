@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <set>
 
@@ -59,10 +60,14 @@ TEST(PhantomBoneCase, SurfaceLabelsAndDensityAreThoseOfTheBone) {
       for (int i = 0; i < scan.geometry.dims[0]; ++i, ++n) {
         const Vec3 at = scan.geometry.position_mm(Vec3(i, j, k));
         const BoneTissue tissue = (*bone)->tissue(at);
+        const BoneDepths depths = (*bone)->depths(at);
+        // A voxel exactly on a face may be on either side of it.
+        if (std::min({std::abs(depths.surface_mm), std::abs(depths.cortex_mm), std::abs(depths.marrow_mm)}) < 1e-9)
+          continue;
         ASSERT_EQ(scan.labels[n], static_cast<int>(tissue)) << at.transpose();
         ASSERT_EQ(scan.tissue[n], tissue == BoneTissue::none ? 0 : tissue == BoneTissue::cortical ? 1 : 2);
         volume += tissue == BoneTissue::none ? 0.0 : pitch * pitch * pitch;
-        const double s = (*bone)->depths(at).surface_mm;
+        const double s = depths.surface_mm;
         if (n % 7 != 0 || std::abs(s) > 1.0) continue;
         // The case has the Euclidean distance, the bone one that is like it; both have the same zero.
         EXPECT_NEAR(found->bone.surface_mm(at), s, 0.1 + 0.3 * std::abs(s)) << at.transpose();
