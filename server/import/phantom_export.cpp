@@ -13,7 +13,7 @@ namespace osteon::import {
 namespace {
 
 constexpr double kFieldAround_mm = 8.0;  // of a scan around the bone
-constexpr double kReach = 5.0;           // of an edge's blur, in sigma
+constexpr double kBlurReach = 5.0;           // of an edge's blur, in sigma
 
 nlohmann::ordered_json numbers_of(const Vec3& v) { return {v.x(), v.y(), v.z()}; }
 
@@ -23,9 +23,9 @@ BlurredHu blurred_hu(const phantoms::PhantomBone& bone, double blur_mm) {
   const auto hu = [](double density_g_cm3) { return imaging::hounsfield(imaging::kRho1995, density_g_cm3); };
   return [&bone, blur_mm, hu, cortical = hu(bone.cortical_g_cm3()), marrow = hu(bone.marrow_g_cm3())](const Vec3& at) {
     const phantoms::BoneDepths depths = bone.depths(at);
-    if (depths.surface_mm > kReach * blur_mm) return kAroundBone_hu;
+    if (depths.surface_mm > kBlurReach * blur_mm) return kAroundBone_hu;
     double found = kAroundBone_hu + (cortical - kAroundBone_hu) * blurred_step(-depths.surface_mm, blur_mm);
-    if (depths.cortex_mm > kReach * blur_mm) return found;
+    if (depths.cortex_mm > kBlurReach * blur_mm) return found;
     const double cancellous = hu(bone.cancellous_g_cm3(at));
     const double inner = cancellous + (marrow - cancellous) * blurred_step(-depths.marrow_mm, blur_mm);
     return found + (inner - cortical) * blurred_step(-depths.cortex_mm, blur_mm);
