@@ -244,23 +244,24 @@ void measure_inside(const BoneView& bone, const std::vector<Vec3>& points, const
     const std::string at = std::string("_") + names[i] + "_mm";
     const double middle = along_at(kFemurStations[i]);
     // Neck, trochanters and condyles only add to the shaft, so the side without them counts.
-    const auto nearer = [&](const Vec3& way) {
-      const double ahead = bone.reach_mm(shaft.centre(middle), way), back = bone.reach_mm(shaft.centre(middle), -way);
-      return ahead <= back ? std::pair(ahead, way) : std::pair(back, Vec3(-way));
-    };
-    const auto [half_width, across] = nearer(shaft.lateral);
-    const auto [half_depth, front] = nearer(Vec3::UnitY());
+    const Vec3 centre = shaft.centre(middle), front = Vec3::UnitY();
+    const double half_width = std::min(bone.reach_mm(centre, shaft.lateral), bone.reach_mm(centre, -shaft.lateral));
+    double half_depth = std::min(bone.reach_mm(centre, front), bone.reach_mm(centre, -front));
+    for (const double way : {-1.0, 1.0}) {
+      // An ellipse from its half width and its reach along the diagonal: 1 / reach² = (1 / a² + 1 / b²) / 2.
+      const double reach = bone.reach_mm(centre, (shaft.lateral + way * front).normalized());
+      half_depth = std::min(half_depth, 1.0 / std::sqrt(2.0 / (reach * reach) - 1.0 / (half_width * half_width)));
+    }
     v["width" + at] = 2.0 * half_width;
     v["depth" + at] = 2.0 * half_depth;
     double sum = 0.0;
     int count = 0;
     for (double off = -3.0; off <= 3.0; off += 0.5)
-      for (double turn = -8.0; turn <= 8.0; turn += 2.0)
-        for (const Vec3& way : {across, front}) {
-          const Vec3 turned = Eigen::AngleAxisd(turn / kDegrees, shaft.up) * way;
-          sum += bone.cortex_mm(shaft.centre(middle + off), turned, 0.45 * v["width" + at]);
-          ++count;
-        }
+      for (double turn = -8.0; turn <= 8.0; turn += 2.0) {
+        const Vec3 turned = Eigen::AngleAxisd(turn / kDegrees, shaft.up) * shaft.lateral;
+        sum += bone.cortex_mm(shaft.centre(middle + off), turned, 0.45 * v["width" + at]);
+        ++count;
+      }
     v["cortex" + at] = sum / count;
   }
   const Vec3 head = found.landmarks["head centre"];

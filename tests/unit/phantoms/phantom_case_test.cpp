@@ -69,8 +69,9 @@ TEST(PhantomBoneCase, SurfaceLabelsAndDensityAreThoseOfTheBone) {
         volume += tissue == BoneTissue::none ? 0.0 : pitch * pitch * pitch;
         const double s = depths.surface_mm;
         if (n % 7 != 0 || std::abs(s) > 1.0) continue;
-        // The case has the Euclidean distance, the bone one that is like it; both have the same zero.
-        EXPECT_NEAR(found->bone.surface_mm(at), s, 0.1 + 0.3 * std::abs(s)) << at.transpose();
+        // The case has the Euclidean distance, the bone one that is like it, which grows slower beside grooves. Both
+        // have the same zero.
+        EXPECT_NEAR(found->bone.surface_mm(at), s, 0.15 + 0.4 * std::abs(s)) << at.transpose();
         if (s < -0.1) {
           EXPECT_NEAR(found->bone.density_g_cm3(at), (*bone)->density_g_cm3(at, pitch), 1e-5) << at.transpose();
         }
