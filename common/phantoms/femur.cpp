@@ -11,11 +11,11 @@ namespace {
 
 constexpr double kRadians = std::numbers::pi / 180.0;
 // Widths in which parts grow together, mm. [A]
-constexpr double kNeckBlend = 10.0, kHeadBlend = 4.0, kTrochanterBlend = 8.0, kLesserBlend = 5.0, kCondyleBlend = 10.0,
+constexpr double kNeckBlend = 10.0, kHeadBlend = 4.0, kTrochanterBlend = 9.5, kLesserBlend = 5.0, kCondyleBlend = 10.0,
                  kTrochleaBlend = 6.0, kEpicondyleBlend = 2.5, kEndBlend = 8.0;
 // Sizes of parts without a parameter, as parts of the head's radius or of the medial condyle's. [A], by the look of
 // real bones.
-constexpr double kTrochanterSize = 0.62, kTrochanterTipSize = 0.42, kLesserSize = 0.45, kLesserProminence = 0.33;
+constexpr double kTrochanterSize = 0.75, kTrochanterTipSize = 0.42, kLesserSize = 0.45, kLesserProminence = 0.33;
 constexpr double kEpicondyleSize = 0.45, kTrochleaSize = 0.7, kGroove = 0.25, kCondyleLift = 0.15;
 constexpr double kIsthmus = 0.52;     // where the neck is narrowest, as a part of its length from the shaft
 constexpr double kNeckFlare = 1.3;    // how much it widens towards the shaft

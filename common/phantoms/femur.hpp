@@ -74,7 +74,7 @@ class Femur final : public PhantomBone {
  private:
   // All that follows is in the bone's own directions: x lateral, y anterior, z proximal. It is the same for both sides.
   [[nodiscard]] Vec3 own(const Vec3& at_mm) const { return {side_ * at_mm.x(), -at_mm.y(), at_mm.z()}; }
-  [[nodiscard]] Vec3 world(const Vec3& own) const { return {side_ * own.x(), -own.y(), own.z()}; }
+  [[nodiscard]] Vec3 world(const Vec3& own) const { return {side_ * own.x() + 0.0, 0.0 - own.y(), own.z() + 0.0}; }
   [[nodiscard]] double along_shaft(const Vec3& at) const { return at.dot(up_); }
   [[nodiscard]] double height_of(double part_of_length) const;  // along the shaft
   [[nodiscard]] Vec3 shaft_centre(double along) const;

@@ -75,9 +75,7 @@ PartKind fill_part(const PhantomBone& bone, const SparseVolume& surface, double 
 
 // Labels: three for each bone, in the order of kTissueNames.
 std::vector<CaseLabel> labels_of(const PhantomBone& bone) {
-  LabelProvenance provenance{.method = "parametric phantom", .parameters = {}, .edits = {}};
-  for (const NamedValue& parameter : bone.parameters())
-    provenance.parameters[std::string(parameter.name)] = parameter.value;
+  const LabelProvenance provenance{.method = "parametric phantom", .parameters = {}, .edits = {}};
   std::vector<CaseLabel> labels;
   const std::vector<std::string> names = bone.names();
   for (const std::string& name : names)
@@ -86,6 +84,8 @@ std::vector<CaseLabel> labels_of(const PhantomBone& bone) {
       labels.push_back({static_cast<int>(labels.size()) + 1, names.size() > 1 ? name + ", " + tissue : tissue,
                         cortical ? LabelKind::cortical : LabelKind::cancellous, provenance});
     }
+  for (const NamedValue& parameter : bone.parameters())
+    labels.front().provenance.parameters[std::string(parameter.name)] = parameter.value;
   return labels;
 }
 

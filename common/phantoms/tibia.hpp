@@ -59,7 +59,7 @@ class Tibia final : public PhantomBone {
  private:
   // In the bone's own directions, as in a femur: x lateral, y anterior, z proximal.
   [[nodiscard]] Vec3 own(const Vec3& at_mm) const { return {side_ * at_mm.x(), -at_mm.y(), at_mm.z()}; }
-  [[nodiscard]] Vec3 world(const Vec3& own) const { return {side_ * own.x(), -own.y(), own.z()}; }
+  [[nodiscard]] Vec3 world(const Vec3& own) const { return {side_ * own.x() + 0.0, 0.0 - own.y(), own.z() + 0.0}; }
   [[nodiscard]] double height_of(double part_of_length) const { return (part_of_length - 1.0) * p_.length_mm; }
   [[nodiscard]] double plafond() const { return height_of(0.0) + p_.malleolus_mm; }  // z of the joint face
   [[nodiscard]] double tibia_mm(const Vec3& at) const;
