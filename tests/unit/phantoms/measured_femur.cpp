@@ -254,11 +254,22 @@ void measure_inside(const BoneView& bone, const std::vector<Vec3>& points, const
     }
     v["width" + at] = 2.0 * half_width;
     v["depth" + at] = 2.0 * half_depth;
+    // Cortex, where the section is most like that ellipse.
+    Vec3 freest = shaft.lateral;
+    double least = std::numeric_limits<double>::infinity();
+    for (int i = 0; i < 8; ++i) {
+      const double angle = i * std::numbers::pi / 4.0;
+      const Vec3 way = std::cos(angle) * shaft.lateral + std::sin(angle) * front;
+      const double ellipse = 1.0 / std::hypot(std::cos(angle) / half_width, std::sin(angle) / half_depth);
+      const double beyond = bone.reach_mm(centre, way) - ellipse;
+      if (beyond < least - 0.05) freest = way;
+      least = std::min(least, beyond);
+    }
     double sum = 0.0;
     int count = 0;
     for (double off = -3.0; off <= 3.0; off += 0.5)
       for (double turn = -8.0; turn <= 8.0; turn += 2.0) {
-        const Vec3 turned = Eigen::AngleAxisd(turn / kDegrees, shaft.up) * shaft.lateral;
+        const Vec3 turned = Eigen::AngleAxisd(turn / kDegrees, shaft.up) * freest;
         sum += bone.cortex_mm(shaft.centre(middle + off), turned, 0.45 * v["width" + at]);
         ++count;
       }
