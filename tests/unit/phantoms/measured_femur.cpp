@@ -267,7 +267,7 @@ void measure_inside(const BoneView& bone, const std::vector<Vec3>& points, const
     }
     double sum = 0.0;
     int count = 0;
-    for (double off = -3.0; off <= 3.0; off += 0.5)
+    for (double off = -0.7; off <= 0.71; off += 0.14)
       for (double turn = -8.0; turn <= 8.0; turn += 2.0) {
         const Vec3 turned = Eigen::AngleAxisd(turn / kDegrees, shaft.up) * freest;
         sum += bone.cortex_mm(shaft.centre(middle + off), turned, 0.45 * v["width" + at]);
