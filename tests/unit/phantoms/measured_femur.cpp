@@ -235,6 +235,23 @@ double passes(const BoneView& bone, const ShaftLine& shaft, double from, double 
   return along;
 }
 
+// Thickness of the cortex at a place of the shaft, on one side of it. Means over a few directions, from there on
+// towards the middle of the shaft, where nothing is beside it; then the value at the begin of a parabola through them.
+double cortex_at(const BoneView& bone, const ShaftLine& shaft, double along, double inwards, const Vec3& side) {
+  constexpr int kSteps = 17;
+  constexpr double kStep_mm = 0.5;
+  Eigen::MatrixXd rows(kSteps, 3);
+  Eigen::VectorXd thickness = Eigen::VectorXd::Zero(kSteps);
+  for (int i = 0; i < kSteps; ++i) {
+    rows.row(i) << 1.0, i, i * i;
+    const Vec3 centre = shaft.centre(along + inwards * kStep_mm * i);
+    const double thickest_mm = 0.45 * bone.reach_mm(centre, side) * 2.0;
+    for (double turn = -12.0; turn <= 12.0; turn += 2.0)
+      thickness[i] += bone.cortex_mm(centre, Eigen::AngleAxisd(turn / kDegrees, shaft.up) * side, thickest_mm) / 13.0;
+  }
+  return rows.colPivHouseholderQr().solve(thickness)[0];
+}
+
 void measure_inside(const BoneView& bone, const std::vector<Vec3>& points, const ShaftLine& shaft, double bottom,
                     double length, MeasuredFemur& found) {
   auto& v = found.values;
@@ -265,15 +282,8 @@ void measure_inside(const BoneView& bone, const std::vector<Vec3>& points, const
       if (beyond < least - 0.05) freest = way;
       least = std::min(least, beyond);
     }
-    double sum = 0.0;
-    int count = 0;
-    for (double off = -0.7; off <= 0.71; off += 0.14)
-      for (double turn = -8.0; turn <= 8.0; turn += 2.0) {
-        const Vec3 turned = Eigen::AngleAxisd(turn / kDegrees, shaft.up) * freest;
-        sum += bone.cortex_mm(shaft.centre(middle + off), turned, 0.45 * v["width" + at]);
-        ++count;
-      }
-    v["cortex" + at] = sum / count;
+    const double inwards = kFemurStations[i] < 0.5 ? 1.0 : -1.0;
+    v["cortex" + at] = cortex_at(bone, shaft, middle, inwards, freest);
   }
   const Vec3 head = found.landmarks["head centre"];
   const double radius = 0.5 * v["head_diameter_mm"];
