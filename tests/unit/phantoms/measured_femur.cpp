@@ -236,7 +236,8 @@ double passes(const BoneView& bone, const ShaftLine& shaft, double from, double 
 }
 
 // Thickness of the cortex at a place of the shaft, on one side of it. Means over a few directions, from there on
-// towards the middle of the shaft, where nothing is beside it; then the value at the begin of a parabola through them.
+// towards the middle of the shaft, where nothing is beside it; then the value at the beginning of a parabola through
+// them.
 double cortex_at(const BoneView& bone, const ShaftLine& shaft, double along, double inwards, const Vec3& side) {
   constexpr int kSteps = 17;
   constexpr double kStep_mm = 0.5;
@@ -245,15 +246,16 @@ double cortex_at(const BoneView& bone, const ShaftLine& shaft, double along, dou
   for (int i = 0; i < kSteps; ++i) {
     rows.row(i) << 1.0, i, i * i;
     const Vec3 centre = shaft.centre(along + inwards * kStep_mm * i);
-    const double thickest_mm = 0.45 * bone.reach_mm(centre, side) * 2.0;
+    const double thickest_mm = 0.9 * bone.reach_mm(centre, side);
     for (double turn = -12.0; turn <= 12.0; turn += 2.0)
       thickness[i] += bone.cortex_mm(centre, Eigen::AngleAxisd(turn / kDegrees, shaft.up) * side, thickest_mm) / 13.0;
   }
   return rows.colPivHouseholderQr().solve(thickness)[0];
 }
 
-void measure_inside(const BoneView& bone, const std::vector<Vec3>& points, const ShaftLine& shaft, double bottom,
-                    double length, MeasuredFemur& found) {
+// Width, depth and cortex at the stations of the shaft.
+void measure_stations(const BoneView& bone, const ShaftLine& shaft, double bottom, double length,
+                      MeasuredFemur& found) {
   auto& v = found.values;
   const auto along_at = [&](double part) { return (bottom + part * length) / shaft.up.z(); };
   const char* names[] = {"15", "25", "40", "55", "74", "80"};
@@ -285,6 +287,12 @@ void measure_inside(const BoneView& bone, const std::vector<Vec3>& points, const
     const double inwards = kFemurStations[i] < 0.5 ? 1.0 : -1.0;
     v["cortex" + at] = cortex_at(bone, shaft, middle, inwards, freest);
   }
+}
+
+void measure_inside(const BoneView& bone, const std::vector<Vec3>& points, const ShaftLine& shaft, double bottom,
+                    double length, MeasuredFemur& found) {
+  auto& v = found.values;
+  const auto along_at = [&](double part) { return (bottom + part * length) / shaft.up.z(); };
   const Vec3 head = found.landmarks["head centre"];
   const double radius = 0.5 * v["head_diameter_mm"];
   double sum = 0.0;
@@ -422,6 +430,7 @@ MeasuredFemur measure_femur(const Case& bone, Side side) {
   measure_knee(view, points, bottom, found);
   v["shaft_forward_mm"] = shaft.forward_mm - found.landmarks["medial condyle"].y();
   measure_hip(view, points, shaft, bottom, length, found);
+  measure_stations(view, shaft, bottom, length, found);
   measure_inside(view, points, shaft, bottom, length, found);
   return found;
 }
