@@ -13,7 +13,7 @@ namespace osteon::import {
 namespace {
 
 constexpr double kFieldAround_mm = 8.0;  // of a scan around the bone
-constexpr double kBlurReach = 5.0;           // of an edge's blur, in sigma
+constexpr double kBlurReach = 5.0;       // of an edge's blur, in sigma
 
 nlohmann::ordered_json numbers_of(const Vec3& v) { return {v.x(), v.y(), v.z()}; }
 
