@@ -17,14 +17,13 @@
 #include "server/import/command.hpp"
 #include "server/import/ct_import.hpp"
 #include "server/import/dicom_reader.hpp"
-#include "server/import/dicom_writer.hpp"
 #include "server/import/edit_file.hpp"
 #include "server/import/found_files.hpp"
 #include "server/import/import_report.hpp"
 #include "server/import/label_export.hpp"
 #include "server/import/label_import.hpp"
 #include "server/import/label_map.hpp"
-#include "server/import/phantom.hpp"
+#include "server/import/option_checks.hpp"
 #include "server/import/scan_arguments.hpp"
 #include "server/import/slice_images.hpp"
 
@@ -33,13 +32,12 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double kPhantomPitch_mm = 0.4;
 constexpr double kMeshPitch_mm = 0.5;
 constexpr const char* kSuggest = "suggest";
 
 struct CaseArguments {
   ScanArguments scan;
-  std::string input, out, title, layers, kind, dicom, legend, spacing, unit = "mm", median, threshold;
+  std::string input, out, title, legend, spacing, unit = "mm", median, threshold;
   std::string keep, grow_by = "volume", window = "400,1800", edges, space = "volume", limits = "100,300";
   std::string rods_of, surface = "half", between_slices = "auto", thin_cortex = "off", contrast = "apart";
   std::optional<std::string> calibration, rods;
@@ -47,19 +45,10 @@ struct CaseArguments {
   std::vector<std::string> bone_colours, seeds, label_names;
   std::optional<double> pitch_mm, similar_hu;
   double gaussian_mm = 0.0, sigma_mm = 1.0, margin_mm = CtOptions{}.margin_mm;
-  double width_mm = 20.0, density_g_cm3 = 1.9, metal_hu = CtOptions{}.metal_hu;
+  double density_g_cm3 = 1.9, metal_hu = CtOptions{}.metal_hu;
   bool rescale_hu = false, json = false, separate = false, merge = false, hollow = false, list = false,
        adaptive = false;
 };
-
-Result<void> save(const Case& bone, const std::string& out, const StopSignal& stop) {
-  if (stop.requested()) return tl::unexpected(stopped());
-  return bone.save(out, [&](double) { return !stop.requested(); });
-}
-Result<void> save(const Case& bone, const CaseScan& scan, const std::string& out, const StopSignal& stop) {
-  if (stop.requested()) return tl::unexpected(stopped());
-  return bone.save(out, scan, [&](double) { return !stop.requested(); });
-}
 
 // "all", or numbers such as "1,3". Empty: the largest that is bone.
 Result<void> parse_keep(const std::string& text, CtOptions& options) {
@@ -364,36 +353,6 @@ Result<std::string> run_slices(const CaseArguments& a, const StopSignal& stop) {
   return text + series;
 }
 
-Result<std::string> run_phantom(const CaseArguments& a, const StopSignal& stop) {
-  if (auto is_free = check_free(a.out); !is_free) return tl::unexpected(is_free.error());
-  if (!a.dicom.empty())
-    if (auto is_free = check_free(a.dicom); !is_free) return tl::unexpected(is_free.error());
-  auto layers = parse_layers(a.layers);
-  if (!layers) return tl::unexpected(layers.error());
-  Phantom phantom;
-  phantom.kind = a.kind == "tube" ? PhantomKind::tube : PhantomKind::block;
-  phantom.layers = std::move(*layers);
-  phantom.width_mm = a.width_mm;
-  const double pitch_mm = a.pitch_mm.value_or(kPhantomPitch_mm);
-
-  Bar bar(stop);
-  const auto bone = build_phantom_case(phantom, pitch_mm, a.title.empty() ? "Phantom" : a.title, bar.stage(0.0, 0.4));
-  if (!bone) return tl::unexpected(bone.error());
-  if (!a.dicom.empty()) {
-    const auto scan = scan_phantom(phantom, pitch_mm, bar.stage(0.4, 0.6));
-    if (!scan) return tl::unexpected(scan.error());
-    if (auto written = write_dicom_series(*scan, a.dicom, bar.stage(0.6, 0.95)); !written)
-      return tl::unexpected(written.error());
-  }
-  if (auto saved = save(*bone, a.out, stop); !saved) {
-    std::error_code error;
-    if (!a.dicom.empty()) fs::remove_all(a.dicom, error);
-    return tl::unexpected(saved.error());
-  }
-  bar.stage(1.0, 1.0)(1.0);
-  return report_text(*bone);
-}
-
 Result<std::string> run_labels(const CaseArguments& a, const StopSignal& stop) {
   if (auto good = check_folders(a); !good) return tl::unexpected(good.error());
   const auto spacing = parse_spacing(a.spacing);
@@ -446,20 +405,6 @@ Result<std::string> run_labels(const CaseArguments& a, const StopSignal& stop) {
     text += line;
   }
   return text;
-}
-
-// A number within these limits. Unlike CLI::Range it refuses "nan".
-CLI::Validator within(double low, double high) {
-  char text[64];
-  std::snprintf(text, sizeof text, "NUMBER in [%g - %g]", low, high);
-  const auto check = [low, high](const std::string& value) {
-    double number = 0.0;
-    if (CLI::detail::lexical_cast(value, number) && number >= low && number <= high) return std::string();
-    char wrong[64];
-    std::snprintf(wrong, sizeof wrong, " is not a number from %g to %g", low, high);
-    return value + wrong;
-  };
-  return {check, text, "within"};
 }
 
 // The word "suggest", or a number within these limits.
@@ -532,6 +477,15 @@ Result<std::string> run_info(const CaseArguments& a) {
 }
 
 }  // namespace
+
+Result<void> save(const Case& bone, const std::string& out, const StopSignal& stop) {
+  if (stop.requested()) return tl::unexpected(stopped());
+  return bone.save(out, [&](double) { return !stop.requested(); });
+}
+Result<void> save(const Case& bone, const CaseScan& scan, const std::string& out, const StopSignal& stop) {
+  if (stop.requested()) return tl::unexpected(stopped());
+  return bone.save(out, scan, [&](double) { return !stop.requested(); });
+}
 
 Result<void> check_free(const std::string& path) {
   std::error_code error;
@@ -721,21 +675,6 @@ void add_case_commands(CLI::App& app, std::vector<Command>& commands) {
   series->add_option("INPUT", a.input, "Folder (with all its subfolders), zip or ISO image")->required();
   series->add_flag("--json", a.json, "For programs");
   commands.push_back({series, [shared](const StopSignal& stop) { return run_series(*shared, stop); }});
-
-  CLI::App* phantom = app.add_subcommand("phantom", "Make a case whose true shape and density are known");
-  phantom->add_option("KIND", a.kind, "block (layers from the top down) or tube (layers from the outside in)")
-      ->required()
-      ->check(CLI::IsMember({"block", "tube"}));
-  phantom->add_option("--layers", a.layers, "THICKNESS_MM:DENSITY_G_CM3,... such as 5:1.9,20:0.3,5:1.9")->required();
-  phantom->add_option("--width", a.width_mm, "Edge of the block, or length of the tube, mm")
-      ->check(within(1.0, 1000.0))
-      ->capture_default_str();
-  phantom->add_option("--pitch", a.pitch_mm, "Voxel edge, mm (default: 0.4)")->check(within(0.02, 10.0));
-  phantom->add_option("--out", a.out, "Folder of the case, made by this command")->required();
-  phantom->add_option("--dicom", a.dicom,
-                      "Also write what a CT scanner would see of it, as a DICOM series, to this folder");
-  phantom->add_option("--title", a.title, "Name shown to people");
-  commands.push_back({phantom, [shared](const StopSignal& stop) { return run_phantom(*shared, stop); }});
 
   CLI::App* labels =
       app.add_subcommand("labels", "Make a case from a segmented volume: PNG slices whose colours name structures");

@@ -7,6 +7,8 @@
 
 #include "common/runtime/progress.hpp"
 #include "common/runtime/stop_signal.hpp"
+#include "common/volume/case.hpp"
+#include "common/volume/case_scan.hpp"
 #include "common/volume/iso_surface.hpp"
 
 namespace CLI {  // the library's
@@ -24,6 +26,7 @@ struct Command {
 void add_case_commands(CLI::App& app, std::vector<Command>& commands);  // make and describe cases
 void add_registration_command(CLI::App& app, std::vector<Command>& commands);
 void add_subvolume_command(CLI::App& app, std::vector<Command>& commands);
+void add_phantom_command(CLI::App& app, std::vector<Command>& commands);
 void add_bone_commands(CLI::App& app, std::vector<Command>& commands);  // work on a case's bone, and list the tools
 
 // One progress bar over all stages. It appears when the first work is done, so a refused input prints only its
@@ -50,5 +53,9 @@ class Bar {
 
 // Checked before the work, not after minutes of it. Error: exists.
 [[nodiscard]] Result<void> check_free(const std::string& path);
+
+// Saves a case unless the user has stopped the command. Errors: those of Case::save().
+[[nodiscard]] Result<void> save(const Case& bone, const std::string& out, const StopSignal& stop);
+[[nodiscard]] Result<void> save(const Case& bone, const CaseScan& scan, const std::string& out, const StopSignal& stop);
 
 }  // namespace osteon::import

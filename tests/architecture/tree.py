@@ -10,6 +10,7 @@ LAYERS = {
     "field": {"core", "geometry", "tools"},
     "volume": {"core", "geometry", "tools", "field"},
     "imaging": {"core", "geometry", "tools", "field", "volume"},
+    "phantoms": {"core", "geometry", "tools", "field", "volume"},
     "surface": {"core", "geometry", "tools", "field"},
     "mechanics": {"core", "geometry", "tools", "field"},
     "sound": {"core"},

@@ -1,20 +1,15 @@
 #include "tests/support/scenes/scanned_bones.hpp"
 
-#include <gdcmReader.h>
-#include <gdcmWriter.h>
-
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <numbers>
-#include <random>
 
 #include "common/imaging/calibration.hpp"
 #include "common/volume/case_scan.hpp"
 #include "common/volume/cut_field.hpp"
 #include "server/import/bone_surface.hpp"
 #include "server/import/dicom_reader.hpp"
-#include "server/import/dicom_writer.hpp"
+#include "server/import/simulated_scanner.hpp"
 
 namespace osteon::test {
 namespace {
@@ -22,25 +17,19 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr double kField_mm = 8.0;      // of the scan around the bones
-constexpr int kPartsOfSlice = 5;       // at which the mean over its thickness is taken
 constexpr double kPointStep_mm = 0.5;  // between points on the true surface
 constexpr double kLeastIsland_cm3 = 0.05;
-
-// The part of a step's height that its blurred edge has at a distance inside it: a Gaussian's integral.
-double blurred_step(double inside_mm, double sigma_mm) {
-  return 0.5 * std::erfc(-inside_mm / (sigma_mm * std::numbers::sqrt2));
-}
 
 // Without noise. Where a surface is much less curved than the blur is wide, its blurred edge depends on the distance
 // alone.
 double hu_at(const BoneScan& scan, const Vec3& at_mm) {
   double hu = kSoftTissue_hu;
   if (scan.skin_mm)
-    hu += (kAir_hu - kSoftTissue_hu) * blurred_step(at_mm.head<2>().norm() - *scan.skin_mm, scan.blur_mm);
+    hu += (kAir_hu - kSoftTissue_hu) * import::blurred_step(at_mm.head<2>().norm() - *scan.skin_mm, scan.blur_mm);
   for (const Shaft& shaft : scan.shafts) {
     const double inside_mm = -shaft.surface_mm(at_mm);
-    hu += (kCortex_hu - kSoftTissue_hu) * blurred_step(inside_mm, scan.blur_mm) +
-          (kCancellous_hu - kCortex_hu) * blurred_step(inside_mm - shaft.cortex_mm, scan.blur_mm);
+    hu += (kCortex_hu - kSoftTissue_hu) * import::blurred_step(inside_mm, scan.blur_mm) +
+          (kCancellous_hu - kCortex_hu) * import::blurred_step(inside_mm - shaft.cortex_mm, scan.blur_mm);
   }
   return hu;
 }
@@ -53,46 +42,6 @@ Box box_of(const BoneScan& scan) {
       box.include(end.array() + shaft.radius_mm);
     }
   return box;
-}
-
-// DICOM has 16 characters for a number.
-std::string decimal(double value) {
-  char text[20];
-  std::snprintf(text, sizeof text, "%.9f", value);
-  text[16] = '\0';
-  return text;
-}
-
-bool move_slice(const fs::path& file, const Vec3& position_mm) {
-  gdcm::Reader reader;
-  reader.SetFileName(file.c_str());
-  if (!reader.Read()) return false;
-  std::string value = decimal(position_mm.x()) + "\\" + decimal(position_mm.y()) + "\\" + decimal(position_mm.z());
-  if (value.size() % 2 != 0) value += ' ';
-  gdcm::DataElement element(gdcm::Tag(0x0020, 0x0032));
-  element.SetVR(gdcm::VR::DS);
-  element.SetByteValue(value.data(), static_cast<std::uint32_t>(value.size()));
-  reader.GetFile().GetDataSet().Replace(element);
-  gdcm::Writer writer;
-  writer.SetFile(reader.GetFile());
-  writer.SetFileName(file.c_str());
-  return writer.Write();
-}
-
-// The first pixels of the slices. The table moves along z, also if the gantry is tilted.
-std::vector<Vec3> positions_of(const BoneScan& scan, const imaging::HuVolume& grid) {
-  const Vec3 normal = grid.directions.col(2);
-  const Vec3 corner =
-      -0.5 * grid.directions * Vec3((grid.dims[0] - 1) * scan.pixel_mm, (grid.dims[1] - 1) * scan.pixel_mm, 0.0);
-  double length_mm = 0.0;
-  for (const double gap_mm : scan.gaps_mm) length_mm += gap_mm;
-  std::vector<Vec3> positions;
-  double along_mm = -0.5 * length_mm;
-  for (std::size_t i = 0; i <= scan.gaps_mm.size(); ++i) {
-    positions.emplace_back(corner + Vec3::UnitZ() * along_mm / normal.z());
-    if (i < scan.gaps_mm.size()) along_mm += scan.gaps_mm[i];
-  }
-  return positions;
 }
 
 // Points spread evenly over the true surface, without those within another shaft.
@@ -224,35 +173,23 @@ std::vector<BoneScan> accuracy_scans() {
 }
 
 Result<void> write_scan(const BoneScan& scan, const fs::path& folder) {
-  imaging::HuVolume grid;
   const Box box = box_of(scan);
   // The tilt moves the ends of the bone within the slices.
   const double half_mm = std::max(box.min_mm.head<2>().cwiseAbs().cwiseMax(box.max_mm.head<2>().cwiseAbs()).maxCoeff(),
                                   scan.skin_mm.value_or(0.0));
   const double size_mm = 2.0 * (half_mm + kField_mm + 0.5 * std::abs(scan.tilt_degrees));
-  const int pixels = static_cast<int>(std::ceil(size_mm / scan.pixel_mm));
-  grid.dims = {pixels, pixels, static_cast<int>(scan.gaps_mm.size()) + 1};
-  grid.spacing_mm = {scan.pixel_mm, scan.pixel_mm, 1.0};
-  grid.directions = Eigen::AngleAxisd(-scan.tilt_degrees * std::numbers::pi / 180.0, Vec3::UnitX()).toRotationMatrix();
-  const std::vector<Vec3> positions = positions_of(scan, grid);
-  std::mt19937 random(scan.seed);
-  std::normal_distribution<double> noise(0.0, scan.noise_hu);
-  for (const Vec3& first : positions)
-    for (int row = 0; row < pixels; ++row)
-      for (int column = 0; column < pixels; ++column) {
-        const Vec3 at = first + scan.pixel_mm * grid.directions * Vec3(column, row, 0.0);
-        double hu = 0.0;
-        for (int i = 0; i < kPartsOfSlice; ++i)
-          hu += hu_at(scan, at + scan.thickness_mm * ((i + 0.5) / kPartsOfSlice - 0.5) * grid.directions.col(2));
-        grid.values.push_back(static_cast<std::int16_t>(std::lround(hu / kPartsOfSlice + noise(random))));
-      }
-  if (auto written = import::write_dicom_series(grid, folder, [](double) { return true; }); !written) return written;
-  std::vector<fs::path> files;
-  for (const auto& entry : fs::directory_iterator(folder)) files.push_back(entry.path());
-  std::ranges::sort(files);
-  for (std::size_t i = 0; i < files.size(); ++i)
-    if (!move_slice(files[i], positions[i])) return failure(ErrorCode::internal, "cannot write " + files[i].string());
-  return {};
+  const import::ScannerSettings settings{.pixel_mm = scan.pixel_mm,
+                                         .gaps_mm = scan.gaps_mm,
+                                         .thickness_mm = scan.thickness_mm,
+                                         .blur_mm = scan.blur_mm,
+                                         .noise_hu = scan.noise_hu,
+                                         .tilt_degrees = scan.tilt_degrees,
+                                         .seed = scan.seed,
+                                         .centre_mm = Vec3::Zero(),
+                                         .width_mm = size_mm,
+                                         .height_mm = size_mm};
+  return import::write_simulated_scan(
+      settings, [&](const Vec3& at_mm) { return hu_at(scan, at_mm); }, folder, [](double) { return true; });
 }
 
 Accuracy accuracy_of(const BoneScan& scan, const Case& bone) {

@@ -1,0 +1,56 @@
+#include "common/phantoms/phantom_bone.hpp"
+
+#include <algorithm>
+#include <span>
+
+#include "common/phantoms/femur.hpp"
+#include "common/phantoms/tibia.hpp"
+
+namespace osteon::phantoms {
+namespace {
+
+// The part of a sample of `width_mm` that lies on the negative side of a face.
+double share_beyond(double distance_mm, double width_mm) { return std::clamp(0.5 - distance_mm / width_mm, 0.0, 1.0); }
+
+Result<void> check_word(const char* what, const std::string& word, std::span<const std::string_view> known) {
+  if (std::ranges::find(known, word) != known.end()) return {};
+  std::string all;
+  for (const std::string_view name : known) all += (all.empty() ? "" : ", ") + std::string(name);
+  return bad_input(std::string(what) + " \"" + word + "\" is not known; give one of " + all);
+}
+
+template <class Bone, class Parameters>
+Result<std::unique_ptr<PhantomBone>> made(Result<Parameters> parameters, Side side) {
+  if (!parameters) return tl::unexpected(parameters.error());
+  return std::make_unique<Bone>(*parameters, side);
+}
+
+}  // namespace
+
+BoneTissue PhantomBone::tissue(const Vec3& at_mm) const {
+  const BoneDepths at = depths(at_mm);
+  if (at.surface_mm >= 0.0) return BoneTissue::none;
+  if (at.cortex_mm >= 0.0) return BoneTissue::cortical;
+  return at.marrow_mm >= 0.0 ? BoneTissue::cancellous : BoneTissue::marrow;
+}
+
+double PhantomBone::density_g_cm3(const Vec3& at_mm, double blur_mm) const {
+  const BoneDepths at = depths(at_mm);
+  const double inner = share_beyond(at.cortex_mm, blur_mm);
+  if (inner == 0.0) return cortical_g_cm3();
+  const double canal = share_beyond(at.marrow_mm, blur_mm);
+  const double within =
+      canal == 1.0 ? marrow_g_cm3() : canal * marrow_g_cm3() + (1.0 - canal) * cancellous_g_cm3(at_mm);
+  return inner * within + (1.0 - inner) * cortical_g_cm3();
+}
+
+Result<std::unique_ptr<PhantomBone>> make_bone(const BoneRecipe& recipe) {
+  if (auto known = check_word("the bone", recipe.kind, kBoneKinds); !known) return tl::unexpected(known.error());
+  if (auto known = check_word("the preset", recipe.preset, kPresets); !known) return tl::unexpected(known.error());
+  if (auto known = check_word("the condition", recipe.condition, kConditions); !known)
+    return tl::unexpected(known.error());
+  if (recipe.kind == "tibia") return made<Tibia>(tibia_parameters(recipe), recipe.side);
+  return made<Femur>(femur_parameters(recipe), recipe.side);
+}
+
+}  // namespace osteon::phantoms

@@ -1,0 +1,77 @@
+// A bone of known shape, tissue and density: a closed form of its parameters. Each kind of bone is one pair of files.
+#pragma once
+#include <map>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "common/core/result.hpp"
+#include "common/geometry/lattice.hpp"
+#include "common/volume/case_description.hpp"
+
+namespace osteon::phantoms {
+
+enum class Side { left, right };
+
+// A parameter of a bone. Its name ends in the unit, such as head_diameter_mm; without a unit it is a fraction.
+struct NamedValue {
+  std::string_view name;
+  double value = 0.0;
+  double least = 0.0, most = 0.0;  // outside of these no such bone exists
+};
+
+// What a person chooses. deploy/docs/phantoms.md lists presets, conditions and parameters.
+struct BoneRecipe {
+  std::string kind = "femur";
+  Side side = Side::left;
+  std::string preset = "male";                 // female, male, small, large
+  std::string condition = "adult";             // young, adult, osteoporotic
+  std::map<std::string, double> changes = {};  // of the preset's parameters, by name
+};
+
+// Tissue at a point. Marrow fills the medullary canal.
+enum class BoneTissue { none, cortical, cancellous, marrow };
+
+// Where a point lies in a bone. Each is the distance to a face, mm, negative beyond it: exact on the face, and close to
+// the Euclidean distance beside it.
+struct BoneDepths {
+  double surface_mm = 0.0;  // the outer face of cortex, negative in bone
+  double cortex_mm = 0.0;   // the inner face of cortex, negative in cancellous bone and marrow
+  double marrow_mm = 0.0;   // the end of marrow, negative in the canal
+  int bone = 1;             // number of the nearest bone, from 1
+};
+
+struct BoneAnatomy {
+  std::vector<Landmark> landmarks;
+  std::vector<PlannedAxis> axes;
+};
+
+// Immutable, so any thread may read it. The frame is LPS in millimetres; each kind says where its origin lies.
+class PhantomBone {
+ public:
+  virtual ~PhantomBone() = default;
+
+  [[nodiscard]] virtual std::vector<std::string> names() const = 0;  // of bone 1, 2, …
+  [[nodiscard]] virtual std::vector<NamedValue> parameters() const = 0;
+  [[nodiscard]] virtual BoneAnatomy anatomy() const = 0;
+  [[nodiscard]] virtual Box bounds() const = 0;  // contains the bone
+  [[nodiscard]] virtual BoneDepths depths(const Vec3& at_mm) const = 0;
+  // Density, g/cm³: that of cancellous bone at a point, and those of the other tissues.
+  [[nodiscard]] virtual double cancellous_g_cm3(const Vec3& at_mm) const = 0;
+  [[nodiscard]] virtual double cortical_g_cm3() const = 0;
+  [[nodiscard]] virtual double marrow_g_cm3() const = 0;
+
+  [[nodiscard]] BoneTissue tissue(const Vec3& at_mm) const;
+  // Mean of the density over `blur_mm` of depth, as samples of that pitch have it. Outside, cortex goes on.
+  [[nodiscard]] double density_g_cm3(const Vec3& at_mm, double blur_mm) const;
+};
+
+inline constexpr std::string_view kBoneKinds[] = {"femur", "tibia"};
+inline constexpr std::string_view kPresets[] = {"female", "male", "small", "large"};
+inline constexpr std::string_view kConditions[] = {"young", "adult", "osteoporotic"};
+
+// Error: invalid_input, naming the kind, preset, condition or parameter that is wrong, and what is allowed.
+[[nodiscard]] Result<std::unique_ptr<PhantomBone>> make_bone(const BoneRecipe& recipe);
+
+}  // namespace osteon::phantoms

@@ -1,0 +1,206 @@
+#include <CLI/CLI.hpp>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <system_error>
+#include <vector>
+
+#include "common/geometry/mesh_file.hpp"
+#include "common/imaging/calibration.hpp"
+#include "common/phantoms/phantom_case.hpp"
+#include "common/volume/cut_field.hpp"
+#include "server/import/bone_recipe_file.hpp"
+#include "server/import/bone_surface.hpp"
+#include "server/import/case_report.hpp"
+#include "server/import/command.hpp"
+#include "server/import/dicom_writer.hpp"
+#include "server/import/option_checks.hpp"
+#include "server/import/phantom.hpp"
+#include "server/import/phantom_export.hpp"
+
+namespace osteon::import {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr double kLayersPitch_mm = 0.4, kBonePitch_mm = 0.7;
+
+struct PhantomArguments {
+  std::string kind, layers, out, dicom, title;
+  std::string side, preset, condition, parameters, stl, truth;
+  std::optional<double> pitch_mm;
+  double width_mm = 20.0, slice_mm = 1.0;
+  ScannerSettings scanner;
+};
+
+// Removes what a command wrote before it failed.
+void remove_outputs(std::initializer_list<std::string> paths) {
+  std::error_code error;
+  for (const std::string& path : paths)
+    if (!path.empty()) fs::remove_all(path, error);
+}
+
+Result<void> check_outputs(const PhantomArguments& a) {
+  for (const std::string& path : {a.out, a.dicom, a.stl, a.truth})
+    if (!path.empty())
+      if (auto is_free = check_free(path); !is_free) return is_free;
+  return {};
+}
+
+Result<std::string> run_layers(const PhantomArguments& a, const StopSignal& stop) {
+  auto layers = parse_layers(a.layers);
+  if (!layers) return tl::unexpected(layers.error());
+  Phantom phantom;
+  phantom.kind = a.kind == "tube" ? PhantomKind::tube : PhantomKind::block;
+  phantom.layers = std::move(*layers);
+  phantom.width_mm = a.width_mm;
+  const double pitch_mm = a.pitch_mm.value_or(kLayersPitch_mm);
+
+  Bar bar(stop);
+  const auto bone = build_phantom_case(phantom, pitch_mm, a.title.empty() ? "Phantom" : a.title, bar.stage(0.0, 0.4));
+  if (!bone) return tl::unexpected(bone.error());
+  if (!a.dicom.empty()) {
+    const auto scan = scan_phantom(phantom, pitch_mm, bar.stage(0.4, 0.6));
+    if (!scan) return tl::unexpected(scan.error());
+    if (auto written = write_dicom_series(*scan, a.dicom, bar.stage(0.6, 0.95)); !written)
+      return tl::unexpected(written.error());
+  }
+  if (auto saved = save(*bone, a.out, stop); !saved) {
+    remove_outputs({a.dicom});
+    return tl::unexpected(saved.error());
+  }
+  bar.stage(1.0, 1.0)(1.0);
+  return report_text(*bone);
+}
+
+// The command line wins over the file.
+Result<phantoms::BoneRecipe> recipe_of(const PhantomArguments& a) {
+  phantoms::BoneRecipe recipe;
+  recipe.kind = a.kind;
+  if (!a.parameters.empty()) {
+    auto read = read_bone_recipe(a.parameters, std::move(recipe));
+    if (!read) return tl::unexpected(read.error());
+    recipe = std::move(*read);
+  }
+  if (!a.preset.empty()) recipe.preset = a.preset;
+  if (!a.condition.empty()) recipe.condition = a.condition;
+  if (!a.side.empty()) recipe.side = a.side == "left" ? phantoms::Side::left : phantoms::Side::right;
+  return recipe;
+}
+
+// Writes everything but the case.
+Result<void> write_bone(const PhantomArguments& a, const phantoms::PhantomBone& bone,
+                        const phantoms::BoneRecipe& recipe, const phantoms::PhantomCase& made, Bar& bar) {
+  if (!a.dicom.empty()) {
+    const ScannerSettings settings = scanner_around(bone, a.scanner, a.slice_mm);
+    if (auto written = write_simulated_scan(settings, blurred_hu(bone, settings.blur_mm), a.dicom, bar.stage(0.4, 0.8));
+        !written)
+      return written;
+  }
+  if (!a.stl.empty()) {
+    const auto mesh = bone_surface(CutField(made.bone, BodyId{0}), bar.stage(0.8, 0.88));
+    if (!mesh) return tl::unexpected(mesh.error());
+    if (auto written = write_stl(*mesh, a.stl); !written) return written;
+  }
+  if (!a.truth.empty()) return write_truth(bone, recipe, made, a.truth, bar.stage(0.88, 0.95));
+  return {};
+}
+
+Result<std::string> run_bone(const PhantomArguments& a, const StopSignal& stop) {
+  const auto recipe = recipe_of(a);
+  if (!recipe) return tl::unexpected(recipe.error());
+  const auto bone = phantoms::make_bone(*recipe);
+  if (!bone)
+    return a.parameters.empty() ? tl::unexpected(bone.error())
+                                : tl::unexpected(Error{bone.error().code, a.parameters + ": " + bone.error().message});
+  Bar bar(stop);
+  phantoms::PhantomCaseOptions options;
+  options.pitch_mm = a.pitch_mm.value_or(kBonePitch_mm);
+  options.title = !a.title.empty()                       ? a.title
+                  : recipe->side == phantoms::Side::left ? "Left " + a.kind
+                                                         : "Right " + a.kind;
+  options.calibration = imaging::kRho1995;
+  options.hu = {imaging::kAir_hu, kAroundBone_hu};
+  const auto made = phantoms::build_phantom_case(**bone, options, bar.stage(0.0, 0.4));
+  if (!made) return tl::unexpected(made.error());
+  auto written = write_bone(a, **bone, *recipe, *made, bar);
+  if (written) written = save(made->bone, made->scan, a.out, stop);
+  if (!written) {
+    remove_outputs({a.dicom, a.stl, a.truth});
+    return tl::unexpected(written.error());
+  }
+  bar.stage(1.0, 1.0)(1.0);
+  return report_text(made->bone);
+}
+
+Result<std::string> run_phantom(const PhantomArguments& a, const StopSignal& stop) {
+  if (auto good = check_outputs(a); !good) return tl::unexpected(good.error());
+  const bool layered = a.kind == "block" || a.kind == "tube";
+  if (layered && a.layers.empty())
+    return bad_input("a " + a.kind +
+                     " needs --layers; write THICKNESS_MM:DENSITY_G_CM3,... such as 5:1.9,20:0.3,5:1.9");
+  if (!layered && !a.layers.empty()) return bad_input("a " + a.kind + " has no --layers; leave them out");
+  for (const std::string* option : {&a.side, &a.preset, &a.condition, &a.parameters, &a.stl, &a.truth})
+    if (layered && !option->empty())
+      return bad_input(
+          "--side, --preset, --condition, --parameters, --stl and --truth are for a femur or a tibia; "
+          "leave them out for a " +
+          a.kind);
+  return layered ? run_layers(a, stop) : run_bone(a, stop);
+}
+
+void add_bone_options(CLI::App& phantom, PhantomArguments& a) {
+  phantom.add_option("--side", a.side, "Of a bone: left (default) or right")->check(CLI::IsMember({"left", "right"}));
+  phantom.add_option("--preset", a.preset, "Of a bone: female, male (default), small or large")
+      ->check(CLI::IsMember({"female", "male", "small", "large"}));
+  phantom.add_option("--condition", a.condition, "Of a bone: young, adult (default) or osteoporotic")
+      ->check(CLI::IsMember({"young", "adult", "osteoporotic"}));
+  phantom.add_option("--parameters", a.parameters, "YAML file with these words and with parameters of the bone");
+  phantom.add_option("--stl", a.stl, "Also write the bone's surface to this STL file");
+  phantom.add_option("--truth", a.truth,
+                     "Also write parameters, landmarks, axes and labels of the bone, to this folder");
+  phantom.add_option("--pixel", a.scanner.pixel_mm, "Of --dicom of a bone: pixel of a slice, mm")
+      ->check(within(0.1, 5.0))
+      ->capture_default_str();
+  phantom.add_option("--slice", a.slice_mm, "Of --dicom of a bone: thickness and distance of slices, mm")
+      ->check(within(0.1, 10.0))
+      ->capture_default_str();
+  phantom.add_option("--blur", a.scanner.blur_mm, "Of --dicom of a bone: sigma of the scanner's blur, mm")
+      ->check(within(0.0, 5.0))
+      ->capture_default_str();
+  phantom.add_option("--noise", a.scanner.noise_hu, "Of --dicom of a bone: standard deviation of the noise, HU")
+      ->check(within(0.0, 500.0))
+      ->capture_default_str();
+  phantom.add_option("--tilt", a.scanner.tilt_degrees, "Of --dicom of a bone: tilt of the gantry, degrees")
+      ->check(within(-30.0, 30.0))
+      ->capture_default_str();
+}
+
+}  // namespace
+
+void add_phantom_command(CLI::App& app, std::vector<Command>& commands) {
+  const auto shared = std::make_shared<PhantomArguments>();
+  PhantomArguments& a = *shared;
+  CLI::App* phantom = app.add_subcommand("phantom", "Make a case whose true shape and density are known");
+  phantom
+      ->add_option("KIND", a.kind,
+                   "block (layers from the top down), tube (layers from the outside in), femur, or tibia (with its "
+                   "fibula)")
+      ->required()
+      ->check(CLI::IsMember({"block", "tube", "femur", "tibia"}));
+  phantom->add_option("--layers", a.layers,
+                      "Of a block or tube: THICKNESS_MM:DENSITY_G_CM3,... such as 5:1.9,20:0.3,5:1.9");
+  phantom->add_option("--width", a.width_mm, "Edge of the block, or length of the tube, mm")
+      ->check(within(1.0, 1000.0))
+      ->capture_default_str();
+  phantom->add_option("--pitch", a.pitch_mm, "Voxel edge, mm (default: 0.4; of a bone 0.7)")->check(within(0.02, 10.0));
+  phantom->add_option("--out", a.out, "Folder of the case, made by this command")->required();
+  phantom->add_option("--dicom", a.dicom,
+                      "Also write what a CT scanner would see of it, as a DICOM series, to this folder");
+  phantom->add_option("--title", a.title, "Name shown to people");
+  add_bone_options(*phantom, a);
+  commands.push_back({phantom, [shared](const StopSignal& stop) { return run_phantom(*shared, stop); }});
+}
+
+}  // namespace osteon::import

@@ -1,0 +1,73 @@
+#include "server/import/phantom_export.hpp"
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <numbers>
+
+#include "common/imaging/calibration.hpp"
+#include "common/runtime/files.hpp"
+#include "server/import/label_export.hpp"
+#include "server/import/new_folder.hpp"
+
+namespace osteon::import {
+namespace {
+
+constexpr double kFieldAround_mm = 8.0;  // of a scan around the bone
+constexpr double kBlurReach = 5.0;       // of an edge's blur, in sigma
+
+nlohmann::ordered_json numbers_of(const Vec3& v) { return {v.x(), v.y(), v.z()}; }
+
+}  // namespace
+
+BlurredHu blurred_hu(const phantoms::PhantomBone& bone, double blur_mm) {
+  const auto hu = [](double density_g_cm3) { return imaging::hounsfield(imaging::kRho1995, density_g_cm3); };
+  return [&bone, blur_mm, hu, cortical = hu(bone.cortical_g_cm3()), marrow = hu(bone.marrow_g_cm3())](const Vec3& at) {
+    const phantoms::BoneDepths depths = bone.depths(at);
+    if (depths.surface_mm > kBlurReach * blur_mm) return kAroundBone_hu;
+    double found = kAroundBone_hu + (cortical - kAroundBone_hu) * blurred_step(-depths.surface_mm, blur_mm);
+    if (depths.cortex_mm > kBlurReach * blur_mm) return found;
+    const double cancellous = hu(bone.cancellous_g_cm3(at));
+    const double inner = cancellous + (marrow - cancellous) * blurred_step(-depths.marrow_mm, blur_mm);
+    return found + (inner - cortical) * blurred_step(-depths.cortex_mm, blur_mm);
+  };
+}
+
+ScannerSettings scanner_around(const phantoms::PhantomBone& bone, ScannerSettings settings, double slice_mm) {
+  const Box box = bone.bounds();
+  const Vec3 size = box.size_mm() + Vec3::Constant(2.0 * kFieldAround_mm);
+  const double tilt = std::abs(settings.tilt_degrees) * std::numbers::pi / 180.0;
+  settings.centre_mm = box.centre_mm();
+  settings.width_mm = size.x();
+  settings.height_mm = size.y() / std::cos(tilt);
+  // Tilted slices reach less far along z in front than behind. The gaps are along the slices' normal.
+  const double length_mm = (size.z() + size.y() * std::tan(tilt)) * std::cos(tilt);
+  settings.gaps_mm.assign(static_cast<std::size_t>(std::ceil(length_mm / slice_mm)), slice_mm);
+  settings.thickness_mm = slice_mm;
+  return settings;
+}
+
+Result<void> write_truth(const phantoms::PhantomBone& bone, const phantoms::BoneRecipe& recipe,
+                         const phantoms::PhantomCase& made, const std::filesystem::path& folder,
+                         const KeepGoing& keep_going) {
+  const CaseInfo& info = made.bone.info();
+  nlohmann::ordered_json truth{{"kind", recipe.kind},
+                               {"side", recipe.side == phantoms::Side::left ? "left" : "right"},
+                               {"preset", recipe.preset},
+                               {"condition", recipe.condition},
+                               {"parameters", nlohmann::ordered_json::object()},
+                               {"landmarks", nlohmann::ordered_json::object()},
+                               {"axes", nlohmann::ordered_json::object()},
+                               {"labels", nlohmann::ordered_json::object()}};
+  for (const phantoms::NamedValue& value : bone.parameters())
+    truth["parameters"][std::string(value.name)] = value.value;
+  for (const Landmark& landmark : info.landmarks) truth["landmarks"][landmark.name] = numbers_of(landmark.point_mm);
+  for (const PlannedAxis& axis : info.axes)
+    truth["axes"][axis.name] = {{"point_mm", numbers_of(axis.point_mm)}, {"direction", numbers_of(axis.direction)}};
+  for (const CaseLabel& label : info.labels) truth["labels"][label.name] = label.value;
+  return write_new_folder(folder, [&](const std::filesystem::path& partial) -> Result<void> {
+    if (auto written = write_file(partial / "truth.json", truth.dump(1) + "\n"); !written) return written;
+    return write_labels(made.scan, info.labels, partial / "labels.nii.gz", keep_going);
+  });
+}
+
+}  // namespace osteon::import

@@ -1,0 +1,28 @@
+// A phantom bone as others see it: what a CT scanner shows, and the exact truth.
+#pragma once
+#include <filesystem>
+#include <string>
+
+#include "common/phantoms/phantom_case.hpp"
+#include "server/import/simulated_scanner.hpp"
+
+namespace osteon::import {
+
+// HU around a phantom bone, LPS: air does not reach it.
+inline constexpr double kAroundBone_hu = 40.0;
+
+// HU as a scanner's blur shows them. Each face of cortex is an edge that depends on its distance alone, so faces must
+// be much less curved than the blur is wide. The texture of cancellous bone is not blurred. `bone` must outlive it.
+[[nodiscard]] BlurredHu blurred_hu(const phantoms::PhantomBone& bone, double blur_mm);
+
+// Settings with slices that cover the bone, `slice_mm` apart and thick.
+[[nodiscard]] ScannerSettings scanner_around(const phantoms::PhantomBone& bone, ScannerSettings settings,
+                                             double slice_mm);
+
+// Makes the folder with truth.json (kind, side, parameters, landmarks, axes; see deploy/docs/phantoms.md) and
+// labels.nii.gz (0 outside, then the labels of the case). Errors: exists, internal (disk), cancelled.
+[[nodiscard]] Result<void> write_truth(const phantoms::PhantomBone& bone, const phantoms::BoneRecipe& recipe,
+                                       const phantoms::PhantomCase& made, const std::filesystem::path& folder,
+                                       const KeepGoing& keep_going);
+
+}  // namespace osteon::import
