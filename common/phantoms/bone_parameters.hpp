@@ -37,7 +37,10 @@ template <class Parameters>
     const auto field = std::ranges::find(fields, name, &ParameterField<Parameters>::name);
     if (field == fields.end()) {
       std::string all;
-      for (const auto& known : fields) all += (all.empty() ? "" : ", ") + std::string(known.name);
+      for (const auto& known : fields) {
+        if (!all.empty()) all += ", ";
+        all += known.name;
+      }
       return bad_input("\"" + name + "\" is no parameter of this bone; write one of " + all);
     }
     if (!(value >= field->least && value <= field->most)) return bad_parameter(name, value, field->least, field->most);

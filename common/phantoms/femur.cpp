@@ -443,8 +443,8 @@ Box Femur::bounds() const {
     include(Vec3(condyle->x, condyle->anterior.y(), condyle->anterior.z()), condyle->radius_mm);
     include(epicondyle(*condyle), 0.0);
   }
-  for (double part = 0.1; part < 0.9; part += 0.05) {
-    const double along = height_of(part);
+  for (int step = 2; step < 18; ++step) {
+    const double along = height_of(step / 20.0);
     include(shaft_centre(along), std::max(half_width_(along), half_depth_(along)));
   }
   return box.grown(kBeyond_mm);

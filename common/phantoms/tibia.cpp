@@ -257,8 +257,8 @@ Box Tibia::bounds() const {
     box.include(world(at) - Vec3::Constant(radius));
     box.include(world(at) + Vec3::Constant(radius));
   };
-  for (double part = 0.0; part <= 1.0; part += 0.02) {
-    const double z = height_of(part);
+  for (int step = 0; step <= 50; ++step) {
+    const double z = height_of(step / 50.0);
     const Vec3 half(half_width_(z), half_depth_(z), 0.0);
     box.include(world(Vec3(0.0, 0.0, z) - half));
     box.include(world(Vec3(0.0, 0.0, z) + half));

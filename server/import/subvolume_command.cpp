@@ -1,4 +1,5 @@
 #include <CLI/CLI.hpp>
+#include <filesystem>
 #include <memory>
 #include <optional>
 #include <string>
@@ -28,7 +29,7 @@ bool has_scan_options(const ScanArguments& a) {
 
 Result<SubVolumeInput> read_input(const SubVolumeArguments& a, const KeepGoing& reading) {
   const bool of_source = is_case(a.scan.input) && !a.source.empty();
-  if (!a.source.empty() && !of_source)
+  if (!a.source.empty() && !of_source && std::filesystem::exists(a.scan.input))
     return bad_input("--source is for a case; leave it out, because " + a.scan.input + " is none");
   if ((is_case(a.scan.input) || is_meta_file(a.scan.input)) && has_scan_options(a.scan) && !of_source)
     return bad_input(a.scan.input + " says itself how it is to be read; leave out the options for scans");

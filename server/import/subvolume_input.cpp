@@ -27,7 +27,7 @@ Result<imaging::VoxelMask> largest_bone(const imaging::HuVolume& part_of_scan, i
                                         const KeepGoing& keep_going) {
   imaging::SegmentationParams params;
   params.threshold_hu = threshold_hu;
-  const auto bone = imaging::segment_bone(part_of_scan, std::move(dense), params, ends, part(keep_going, 0.0, 0.7));
+  auto bone = imaging::segment_bone(part_of_scan, std::move(dense), params, ends, part(keep_going, 0.0, 0.7));
   if (!bone) return bone;
   const auto islands = imaging::find_islands(part_of_scan, *bone, {}, part(keep_going, 0.7, 0.85));
   if (!islands) return tl::unexpected(islands.error());

@@ -75,15 +75,15 @@ Result<Picture> boxes_picture(const SubVolumeInput& input, const SubVolumeMeasur
     whole.text(x + 6, 4, caption, kWhiteInk, 2);
     whole.paste(panel, x, kBoxCaption);
   };
-  const auto front = side_panel(object, View::coronal, input.geometry, measures, part(keep_going, 0.0, 0.45));
+  auto front = side_panel(object, View::coronal, input.geometry, measures, part(keep_going, 0.0, 0.45));
   if (!front) return front;
   place(*front, "from the front", 0);
-  const auto left = side_panel(object, View::sagittal, input.geometry, measures, part(keep_going, 0.45, 0.9));
+  auto left = side_panel(object, View::sagittal, input.geometry, measures, part(keep_going, 0.45, 0.9));
   if (!left) return left;
   place(*left, "from the left", 1);
   const auto highest =
       std::ranges::max_element(measures.sections, {}, [](const CoordBox& section) { return section.dims().z; });
-  const auto section =
+  auto section =
       section_panel(input, *highest, static_cast<int>(measures.subdivisions.size()) - 1, part(keep_going, 0.9, 1.0));
   if (!section) return section;
   place(*section, "section " + std::to_string(highest - measures.sections.begin() + 1) + ": full, partly full", 2);
