@@ -38,7 +38,7 @@ Result<SubVolumeInput> read_input(const SubVolumeArguments& a, const KeepGoing& 
       return bad_input("--threshold is for a scan; leave it out, because the case " + a.scan.input +
                        " says what is bone");
     if (!of_source) return input_of_case(a.scan.input, reading);
-    const auto of_case = input_of_case(a.scan.input, part(reading, 0.0, 0.3));
+    auto of_case = input_of_case(a.scan.input, part(reading, 0.0, 0.3));
     if (!of_case) return of_case;
     ScanArguments from = a.scan;
     from.input = a.source;
