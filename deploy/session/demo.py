@@ -1,4 +1,4 @@
-"""The part of deploy/demo after installation and build: imports the case, runs a session, writes its report."""
+"""The part of deploy/demo after installation and build: makes the case, runs a session, writes its report."""
 import argparse
 import fcntl
 import hashlib
@@ -74,23 +74,34 @@ def prepare_case(source: Path, programs: Path, title):
         return source
     importer = programs / "osteon-import"
     name = "".join(c if c.isalnum() else "-" for c in source.stem) or "case"
-    case = ROOT / "build" / "cases" / f"{name}-{fingerprint(source, importer)}"
+    return made_once(f"{name}-{fingerprint(source, importer)}", source, [importer, "ct", source, *title])
+
+
+def phantom_case(bone, programs: Path):
+    importer = programs / "osteon-import"
+    return made_once(f"{bone}-{fingerprint(importer, importer)}", f"the phantom of a {bone}",
+                     [importer, "phantom", bone])
+
+
+def made_once(name, what, command):
+    """The case of that name in build/cases. `command` makes it, if it is not there."""
+    case = ROOT / "build" / "cases" / name
     if (case / "case.json").exists():
         return case
     case.parent.mkdir(parents=True, exist_ok=True)
-    # Another demo may be importing the same files. Then this one waits and takes its case.
+    # Another demo may be making the same case. Then this one waits and takes it.
     with open(case.with_name(f"{case.name}.lock"), "a", encoding="utf-8") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
         if not (case / "case.json").exists():
-            import_case(source, importer, case, title)
+            make_case(what, command, case)
     return case
 
 
-def import_case(source: Path, importer: Path, case: Path, title):
-    say(f"Importing {source}")
+def make_case(what, command, case: Path):
+    say(f"Importing {what}")
     started = time.monotonic()
     # In its own process session, so that Ctrl-C reaches it only once, through this process.
-    process = subprocess.Popen([importer, "ct", source, "--out", case, *title], stdin=subprocess.DEVNULL, text=True,
+    process = subprocess.Popen([*command, "--out", case], stdin=subprocess.DEVNULL, text=True,
                                stderr=None if sys.stderr.isatty() else subprocess.PIPE, start_new_session=True)
     try:
         _, errors = process.communicate()
@@ -100,15 +111,16 @@ def import_case(source: Path, importer: Path, case: Path, title):
         raise
     if process.returncode != 0:
         words = (errors or "").strip().splitlines()
-        raise Failure(words[-1] if words else f"osteon-import could not read {source}")
+        raise Failure(words[-1] if words else f"osteon-import could not read {what}")
     say(f"Imported in {time.monotonic() - started:.0f} s; the next run finds the case in build/cases.")
 
 
-def run_on_some_side(programs, case, directions, out):
+def run_on_some_side(programs, case, directions, out, on_shaft):
     """Runs the session. If there is no bone along one direction, the next direction is tried."""
     for direction in directions:
         try:
-            return Session(programs, case, plans.drill_and_window(direction), out, say, device=DEVICE).run()
+            plan = plans.drill_and_window(direction, on_shaft)
+            return Session(programs, case, plan, out, say, device=DEVICE).run()
         except Failure as failure:
             if direction == directions[-1] or "entry" not in failure.detail:
                 raise
@@ -123,15 +135,18 @@ def case_title(programs, case):
 def run(options, programs, out):
     """The demo, in a folder of its own. Exit code 1: somebody held another bone at the end."""
     started = time.monotonic()
-    source = options.case or example_skull()
-    title = [] if options.case else ["--title", "Human skull"]
-    case = prepare_case(source.resolve(), programs, title)
+    if options.bone:
+        case, directions, sides = phantom_case(options.bone, programs), [plans.FRONT], [plans.FRONT, plans.BACK]
+    elif options.case:
+        case, directions = prepare_case(options.case.resolve(), programs, []), plans.ANY_SIDE
+        sides = plans.ANY_SIDE[1:3]
+    else:
+        case = prepare_case(example_skull().resolve(), programs, ["--title", "Human skull"])
+        directions, sides = [plans.LEFT_PARIETAL], [plans.LEFT_PARIETAL, plans.RIGHT_PARIETAL]
     empty(out)
     if options.together:
-        sides = plans.ANY_SIDE[1:3] if options.case else [plans.LEFT_PARIETAL, plans.RIGHT_PARIETAL]
         return together.run(programs, case, sides, out, say, DEVICE, case_title(programs, case))
-    directions = plans.ANY_SIDE if options.case else [plans.LEFT_PARIETAL]
-    numbers = run_on_some_side(programs, case, directions, out)
+    numbers = run_on_some_side(programs, case, directions, out, on_shaft=bool(options.bone))
     say("Writing the report")
     session = record.read_table(out / "session.csv")
     plots.force_and_depth(session, out / "force_depth.png")
@@ -149,6 +164,7 @@ def end_politely(*_):
 def main():
     parser = argparse.ArgumentParser(prog="deploy/demo")
     parser.add_argument("--case", type=Path)
+    parser.add_argument("--bone")
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--build", type=Path, required=True)
     parser.add_argument("--together", action="store_true")

@@ -332,6 +332,33 @@ grep -q '%s' ../../twice.txt || { echo '[  FAILED  ] Twice.IsTwice'; exit 1; }
         self.assertLessEqual(set().union(*clients), named["lint_targets"])
 
 
+class DemoOfAPhantom(unittest.TestCase):
+    def test_wrong_bones_are_one_sentence(self):
+        for wrong, sentence in ((["--bone", "pelvis"], "--bone: there is no phantom of a 'pelvis'; take femur or tibia"),
+                                (["--bone", "femur", "--case", "/"],
+                                 "--case and --bone both name a bone; give one of them"),
+                                (["--bone"], "--bone needs a value")):
+            tried = ended([ROOT / "deploy/demo", *wrong])
+            self.assertNotEqual(tried.returncode, 0)
+            self.assertEqual((tried.stdout, tried.stderr), ("", f"deploy/demo: {sentence}\n"))
+
+    def test_the_importer_makes_it_once(self):
+        with tempfile.TemporaryDirectory() as name:
+            folder = Path(name)
+            (folder / "bin").mkdir()
+            importer = folder / "bin/osteon-import"
+            importer.write_text("#!/bin/sh\necho \"$1 $2 $3\" >>\"$0.runs\"\nmkdir \"$4\"\n: >\"$4/case.json\"\n",
+                                encoding="utf-8")
+            importer.chmod(0o755)
+            self.addCleanup(setattr, demo, "ROOT", demo.ROOT)
+            demo.ROOT = folder
+            first = demo.phantom_case("femur", folder / "bin")
+            self.assertEqual(demo.phantom_case("femur", folder / "bin"), first)
+            self.assertNotEqual(demo.phantom_case("tibia", folder / "bin"), first)
+            self.assertEqual((folder / "bin/osteon-import.runs").read_text(encoding="utf-8"),
+                             "phantom femur --out\nphantom tibia --out\n")
+
+
 class TwoDemos(unittest.TestCase):
     def setUp(self):
         folder = tempfile.TemporaryDirectory()
