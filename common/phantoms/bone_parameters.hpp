@@ -69,9 +69,9 @@ void scale_lengths(Parameters& parameters, std::span<const ParameterField<Parame
 struct ConditionFactors {
   double cortex = 1.0, cancellous = 1.0;
 };
-// Cortex: Feik 1997 found a medullary canal of some 20 % of the section of the femur's midshaft in the young and of
-// some 41 % in women in their eighties, without the pores of cortex. A ring has the thickness r (1 - √share), so cortex
-// is 1.1 times as thick as that of our adults (share 0.25) in the young, and 0.8 times in the old. [A] Cancellous bone.
+// Feik 1997 found a medullary canal of some 20 % of the section of the femur's midshaft in the young and of some 41 %
+// in women in their eighties, without the pores of cortex. With these factors a young man's has 21 % and an
+// osteoporotic woman's 42 %. [A] Cancellous bone.
 [[nodiscard]] inline ConditionFactors factors_of(std::string_view condition) {
   if (condition == "young") return {1.1, 1.2};
   if (condition == "osteoporotic") return {0.8, 0.6};
