@@ -115,16 +115,15 @@ def make_case(what, command, case: Path):
     say(f"Imported in {time.monotonic() - started:.0f} s; the next run finds the case in build/cases.")
 
 
-def run_on_some_side(programs, case, directions, out, on_shaft):
-    """Runs the session. If there is no bone along one direction, the next direction is tried."""
-    for direction in directions:
+def run_on_some_side(programs, case, entries, out):
+    """Runs the session. If there is no bone at one entry, the next one is tried."""
+    for entry in entries:
         try:
-            plan = plans.drill_and_window(direction, on_shaft)
-            return Session(programs, case, plan, out, say, device=DEVICE).run()
+            return Session(programs, case, plans.drill_and_window(entry), out, say, device=DEVICE).run()
         except Failure as failure:
-            if direction == directions[-1] or "entry" not in failure.detail:
+            if entry == entries[-1] or "entry" not in failure.detail:
                 raise
-            say(f"No bone to drill along {direction}; trying from another side.")
+            say(f"No bone to drill along {plans.outward(entry).tolist()}; trying from another side.")
     return None
 
 
@@ -136,17 +135,21 @@ def run(options, programs, out):
     """The demo, in a folder of its own. Exit code 1: somebody held another bone at the end."""
     started = time.monotonic()
     if options.bone:
-        case, directions, sides = phantom_case(options.bone, programs), [plans.FRONT], [plans.FRONT, plans.BACK]
+        case = phantom_case(options.bone, programs)
+        together_at = plans.on_shaft(case_info(programs, case), options.bone)
+        alone_at = together_at[:1]
     elif options.case:
-        case, directions = prepare_case(options.case.resolve(), programs, []), plans.ANY_SIDE
-        sides = plans.ANY_SIDE[1:3]
+        case = prepare_case(options.case.resolve(), programs, [])
+        together_at = plans.from_two_sides(*plans.ANY_SIDE[1:3])
+        alone_at = [plans.toward(side) for side in plans.ANY_SIDE]
     else:
         case = prepare_case(example_skull().resolve(), programs, ["--title", "Human skull"])
-        directions, sides = [plans.LEFT_PARIETAL], [plans.LEFT_PARIETAL, plans.RIGHT_PARIETAL]
+        together_at = plans.from_two_sides(plans.LEFT_PARIETAL, plans.RIGHT_PARIETAL)
+        alone_at = together_at[:1]
     empty(out)
     if options.together:
-        return together.run(programs, case, sides, out, say, DEVICE, case_title(programs, case))
-    numbers = run_on_some_side(programs, case, directions, out, on_shaft=bool(options.bone))
+        return together.run(programs, case, together_at, out, say, DEVICE, case_title(programs, case))
+    numbers = run_on_some_side(programs, case, alone_at, out)
     say("Writing the report")
     session = record.read_table(out / "session.csv")
     plots.force_and_depth(session, out / "force_depth.png")

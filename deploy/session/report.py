@@ -147,8 +147,8 @@ bone, and a simulated surgeon worked on it for {numbers['seconds_of_work']:.0f} 
 <div class=facts>{''.join(facts)}</div>
 
 <h2>Before and after</h2>
-<p>The bone comes from computed tomography. The server keeps it together with everything that was cut away; the viewer
-receives only the blocks of surface that changed. Cut faces have a colour of their own.</p>
+<p>The server keeps the bone together with everything that was cut away; the viewer receives only the blocks of surface
+that changed. Cut faces have a colour of their own.</p>
 <div class=pair>{picture(folder, 'before.png', 'Before')}{picture(folder, 'after.png', 'After')}</div>
 
 <h2>The cuts from near</h2>
@@ -158,11 +158,12 @@ receives only the blocks of surface that changed. Cut faces have a colour of the
 
 <h2>Force, feed and depth</h2>
 <p>Pushing harder drills faster, and dense bone needs more force than spongy bone. The hand pushes with nearly constant
-force. So the <b>feed</b> shows where the drill is: slow in the dense outer table of the skull, faster in the spongy
-layer below it, slow again in the inner table. When the inner table breaks, nothing holds the tool back. It plunges
-until the hand has reacted. <b>Physical</b> force is the force of the bone on the tool. <b>Rendered</b> force is the
-force of a device on the hand: physical force, scaled by {numbers['programs']['haptic']['force_scale']:g} to the range
-of the device. Shaded: between a tool's first and last cut.</p>
+force. So the <b>feed</b> shows where the drill is: slow in dense cortex, as the outer table of a skull or the wall of a
+shaft; faster in the spongy bone or the marrow below it; slow again in the cortex of the far side. When the far cortex
+breaks, nothing holds the tool back. It plunges until the hand has reacted. <b>Physical</b> force is the force of the
+bone on the tool. <b>Rendered</b> force is the force of a device on the hand: physical force, scaled by
+{numbers['programs']['haptic']['force_scale']:g} to the range of the device. Shaded: between a tool's first and last
+cut.</p>
 {picture(folder, 'force_depth.png', 'Force, feed and depth over time; force over depth for each tool', wide=True)}
 <div class=scroll><table><tr><th>tool</th><th class=n>bone here, mm</th>
 <th class=n>deepest, mm</th><th class=n>cutting, s</th>

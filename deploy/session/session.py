@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+import plans
 import record
 from processes import Failure, Household, has_sound_server, start_screen
 
@@ -106,16 +107,14 @@ class Session:
 
     def _overview(self):
         """The camera command for the whole bone, from the side of the work."""
-        box = self.info["bounds_mm"]
-        low, high = np.array(box["min"]), np.array(box["max"])
-        entry = next((step["entry"] for step in self.plan["steps"] if "toward" in step.get("entry", {})), None)
+        entry = next((step["entry"] for step in self.plan["steps"]
+                      if {"toward", "axis"} & step.get("entry", {}).keys()), None)
         if entry is None:
             return "look overview"
         # Slightly from the front, so that the bone is easy to recognise.
-        eye_side = unit(unit(np.array(entry["toward"], dtype=float)) + np.array([0.0, -0.75, -0.15]))
+        eye_side = unit(unit(plans.outward(entry)) + np.array([0.0, -0.75, -0.15]))
         up = np.array([0.0, 0.0, 1.0]) if abs(eye_side[2]) < 0.95 else np.array([0.0, -1.0, 0.0])
-        centre = 0.5 * (low + high)
-        return look(centre, centre + 1.42 * float(np.linalg.norm(high - low)) * eye_side, up)
+        return look_at_all(self.info["bounds_mm"], eye_side, up)
 
     def _start_audio(self, address):
         command = [self.programs / "osteon-audio", "--server", address, "--plain", "--wav", self.out / "sound.wav",
@@ -224,6 +223,15 @@ def unit(vector):
 
 def look(target, eye, up):
     return "look at {} from {} up {}".format(*(" ".join(f"{v:.3f}" for v in point) for point in (target, eye, up)))
+
+
+def look_at_all(box, eye_side, up):
+    """The camera command for a whole box of bone in mm, seen from a side. `eye_side` and `up` are unit vectors."""
+    low, high = np.array(box["min"]), np.array(box["max"])
+    # The viewer shows 0.54 of the distance as height. A long bone needs all of it, a skull is wider than high.
+    distance = max(1.42 * float(np.linalg.norm(high - low)), 2.1 * float(np.abs(up) @ (high - low)))
+    centre = 0.5 * (low + high)
+    return look(centre, centre + distance * eye_side, up)
 
 
 def close_up(step):

@@ -10,11 +10,12 @@ from pathlib import Path
 import h5py
 import numpy as np
 
+import plans
 import plots
 import record
 import report
 from processes import Failure, Household, start_screen
-from session import ROOT, Viewer, case_info, check_journal, look, unit
+from session import ROOT, Viewer, case_info, check_journal, look_at_all, unit
 
 ROOM = "theatre"
 TRAINEES = {"anna": "trainee", "ben": "trainee"}
@@ -96,18 +97,12 @@ class Certificates:
         return result.stdout
 
 
-def burr_window(toward, size_mm, then_s):
-    return {"steps": [
-        {"action": "burr", "tool": "burr-round-5", "spindle_rpm": 20000, "hand": "expert", "entry": {"toward": toward},
-         "window_mm": size_mm, "depth_mm": 2.0, "sweep_mm_per_s": 15},
-        {"action": "wait", "seconds": then_s},
-    ]}
-
-
 class Together:
-    def __init__(self, programs: Path, case: Path, sides, out: Path, say, device, size="1280x720"):
+    """`entries` are those of the two trainees and of the instructor."""
+
+    def __init__(self, programs: Path, case: Path, entries, out: Path, say, device, size="1280x720"):
         self.programs, self.case, self.out, self.say, self.device, self.size = programs, case, out, say, device, size
-        self.sides = sides
+        self.entries = dict(zip((*TRAINEES, INSTRUCTOR), entries))
         self.started = time.monotonic()
         self.info = case_info(programs, case)
 
@@ -167,13 +162,10 @@ class Together:
 
     def _from_side(self, turn):
         """The camera command for the whole bone, from above the work of both."""
-        box = self.info["bounds_mm"]
-        low, high = np.array(box["min"]), np.array(box["max"])
-        side = unit(unit(np.array(self.sides[0], dtype=float)) + unit(np.array(self.sides[1], dtype=float))
-                    + np.array([turn, -0.5, 0.2]))
+        sides = [unit(plans.outward(self.entries[name])) for name in TRAINEES]
+        side = unit(sides[0] + sides[1] + np.array([turn, -0.5, 0.2]))
         up = np.array([0.0, -1.0, 0.0]) if abs(side[2]) > 0.9 else np.array([0.0, 0.0, 1.0])
-        centre = 0.5 * (low + high)
-        return look(centre, centre + 1.42 * float(np.linalg.norm(high - low)) * side, up)
+        return look_at_all(self.info["bounds_mm"], side, up)
 
     def _wait(self, what, holds, patience_s=PATIENCE_S):
         deadline = time.monotonic() + patience_s
@@ -189,9 +181,9 @@ class Together:
 
     def _work(self, address, viewer, console, berg):
         hands = {}
-        for (name, role), side in zip(TRAINEES.items(), self.sides):
+        for name, role in TRAINEES.items():
             hands[name] = self._start_hand(address, name, self.certificates.person(name, role),
-                                           burr_window(side, [18, 12], then_s=STAYS_S))
+                                           plans.window(self.entries[name], [18, 12], then_s=STAYS_S))
             hands[name].may_end = True
         self._wait("that both surgeons cut", lambda: all(self._cuts(console, name) > 100 for name in TRAINEES), 120.0)
         console.do("say all I am watching you both")
@@ -205,8 +197,8 @@ class Together:
         frozen = self._cuts(console, "anna")
         time.sleep(2.0)
         console.do("take anna")
-        beside_anna = list(np.array(self.sides[0]) + [0.0, 0.3, 0.0])
-        hands["berg"] = self._start_hand(address, INSTRUCTOR, berg, burr_window(beside_anna, [8, 6], then_s=0.5))
+        hands["berg"] = self._start_hand(address, INSTRUCTOR, berg,
+                                         plans.window(self.entries[INSTRUCTOR], [8, 6], then_s=0.5))
         hands["berg"].may_end = True
         self._wait("that the instructor's hand cuts", lambda: self._cuts(console, INSTRUCTOR) > 20, 120.0)
         console.do(f"guide anna along {console.hands()[INSTRUCTOR].number} share 0.6")
@@ -443,8 +435,8 @@ raise it faster.</p>
     (out / "report.html").write_text(page, encoding="utf-8")
 
 
-def run(programs, case, sides, out, say, device, title):
-    numbers = Together(programs, case, sides, out, say, device).run()
+def run(programs, case, entries, out, say, device, title):
+    numbers = Together(programs, case, entries, out, say, device).run()
     say("Writing the report")
     write_report(out, numbers, title)
     for at, who, what in numbers["events"]["events"]:

@@ -13,6 +13,7 @@ sys.path.insert(0, str(ROOT / "deploy/session"))
 
 import numpy as np  # noqa: E402  (the path above comes first)
 
+import plans  # noqa: E402
 import record  # noqa: E402
 import session  # noqa: E402
 from processes import Failure, Household  # noqa: E402
@@ -38,6 +39,61 @@ class Latencies(unittest.TestCase):
 
     def test_nothing_measured_is_not_zero(self):
         self.assertIsNone(record.spread([])["p50"])
+
+
+def leg(bone, side):
+    """Landmarks and axes of a straight bone that leans by 3 : 40 towards its outer side. `side` is 1 for a left one."""
+    along, outer = np.array([side * 3.0, 0.0, 40.0]), np.array([side * 30.0, 0.0, 0.0])
+    marks = {"femur": {"lateral epicondyle": outer, "medial epicondyle": -outer},
+             "tibia": {"knee centre": 10 * along, "ankle centre": 0 * along,
+                       "lateral malleolus": outer, "medial malleolus": -outer}}[bone]
+    return {"landmarks": [{"name": name, "point_mm": point.tolist()} for name, point in marks.items()],
+            "axes": [{"name": "anatomical axis", "point_mm": (5 * along).tolist(),
+                      "direction": (along / np.linalg.norm(along)).tolist()}]}
+
+
+class EntriesOnAShaft(unittest.TestCase):
+    def test_lead_across_it_through_its_axis(self):
+        for bone, height_mm in (("femur", 200.0), ("tibia", 300.0)):
+            along = np.array([3.0, 0.0, 40.0])
+            centre = height_mm / 40.0 * along
+            entries = plans.on_shaft(leg(bone, 1), bone)
+            for entry, apart_mm in zip(entries, (0.0, -plans.APART_MM, plans.APART_MM), strict=True):
+                self.assertAlmostEqual(np.linalg.norm(entry["axis"]), 1.0)
+                self.assertAlmostEqual(np.dot(entry["axis"], along), 0.0)
+                np.testing.assert_allclose(entry["point_mm"], centre + apart_mm * along / np.linalg.norm(along))
+
+    def test_are_lateral_on_a_femur_medial_on_a_tibia_and_in_front(self):
+        for bone, sign in (("femur", 1.0), ("tibia", -1.0)):
+            for side in (1, -1):
+                first, second, third = map(plans.outward, plans.on_shaft(leg(bone, side), bone))
+                self.assertGreater(sign * side * first[0], 0.99)
+                np.testing.assert_allclose(second, [0.0, -1.0, 0.0], atol=1e-12)
+                np.testing.assert_allclose(third, first)
+
+    def test_of_a_right_bone_are_those_of_the_left_one_mirrored(self):
+        for bone in ("femur", "tibia"):
+            for left, right in zip(plans.on_shaft(leg(bone, 1), bone), plans.on_shaft(leg(bone, -1), bone)):
+                for key in ("point_mm", "axis"):
+                    np.testing.assert_allclose(np.array(left[key]) * [-1, 1, 1], right[key], atol=1e-9)
+
+    def test_windows_are_longest_along_it(self):
+        shaft = plans.on_shaft(leg("femur", 1), "femur")[0]
+        for entry, size_mm in ((shaft, [12, 18]), (plans.toward([1, 0, 0]), [18, 12])):
+            self.assertEqual(plans.window(entry, [18, 12], 0.5)["steps"][0]["window_mm"], size_mm)
+
+
+class Overview(unittest.TestCase):
+    def test_shows_all_of_a_long_bone(self):
+        half_height = np.tan(np.radians(15.0))  # the viewer's camera has an angle of 30 degrees
+        for size in ([130.0, 80.0, 430.0], [105.0, 83.0, 400.0]):
+            for side in ([1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.8, -0.6, 0.0]):
+                box = {"min": [0.0, 0.0, 0.0], "max": size}
+                words = session.look_at_all(box, np.array(side), np.array([0.0, 0.0, 1.0])).split()
+                eye = np.array(list(map(float, words[6:9])))
+                for corner in np.ndindex(2, 2, 2):
+                    sight = np.array(corner) * size - eye
+                    self.assertLess(abs(sight[2]), half_height * -np.dot(sight, side))
 
 
 class Tables(unittest.TestCase):
