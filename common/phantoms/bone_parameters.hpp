@@ -36,12 +36,12 @@ template <class Parameters>
   for (const auto& [name, value] : changes) {
     const auto field = std::ranges::find(fields, name, &ParameterField<Parameters>::name);
     if (field == fields.end()) {
-      std::string all;
+      std::string message = "\"" + name + "\" is no parameter of this bone; write one of ";
       for (const auto& known : fields) {
-        if (!all.empty()) all += ", ";
-        all += known.name;
+        if (&known != &fields.front()) message += ", ";
+        message += known.name;
       }
-      return bad_input("\"" + name + "\" is no parameter of this bone; write one of " + all);
+      return bad_input(message);
     }
     if (!(value >= field->least && value <= field->most)) return bad_parameter(name, value, field->least, field->most);
     parameters.*field->value = value;
