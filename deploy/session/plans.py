@@ -34,9 +34,9 @@ def is_on_shaft(entry):
 def on_shaft(case, bone):
     """Entries of two surgeons and of an instructor on the shaft of a femur or a tibia, across the shaft.
 
-    `case` has landmarks and axes in mm, LPS. The first surgeon works on a femur laterally, at the apex of its bow. On a
-    tibia he works medially, at a quarter of the way from the knee to the ankle. The second one works in front, further
-    down; the instructor works beside the first one, further up.
+    `case` has landmarks and axes in mm, LPS. The first surgeon works laterally on a femur, at the apex of its bow, and
+    medially on a tibia, at a quarter of the way from the knee to the ankle. The second surgeon works in front, further
+    down. The instructor works above the first surgeon.
     """
     marks = {mark["name"]: np.array(mark["point_mm"]) for mark in case["landmarks"]}
     if bone == "femur":
