@@ -56,19 +56,19 @@ def on_shaft(case, bone):
     return [entry(side, 0.0), entry(np.array(FRONT), -APART_MM), entry(side, APART_MM)]
 
 
-def burr_window(entry, size_mm, depth_mm=2.0):
+def burr_window(entry, size_mm):
     """The step that burrs a window."""
     return {"action": "burr", "tool": "burr-round-5", "spindle_rpm": 20000, "hand": "expert", "entry": entry,
-            "window_mm": list(size_mm), "depth_mm": depth_mm, "sweep_mm_per_s": 15}
+            "window_mm": list(size_mm), "depth_mm": 2.0, "sweep_mm_per_s": 15}
 
 
 def drill_and_window(entry):
     """A 3.2 mm hole, and a small window burred beside it, or below it on the shaft of a long bone."""
-    beside, window = ([0, 14], [7, 10]) if is_on_shaft(entry) else ([14, 0], [10, 7])
+    beside, size_mm = ([0, 14], [7, 10]) if is_on_shaft(entry) else ([14, 0], [10, 7])
     return {"steps": [
         {"action": "drill", "tool": "drill-3.2", "spindle_rpm": 1000, "hand": "expert", "entry": entry},
         {"action": "wait", "seconds": 0.5},
-        burr_window({"beside_last_mm": beside}, window),
+        burr_window({"beside_last_mm": beside}, size_mm),
         {"action": "wait", "seconds": 0.5},
     ]}
 
