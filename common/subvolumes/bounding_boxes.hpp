@@ -1,4 +1,4 @@
-// Bounding volumes of a bone (Niu 2008, §5.2.1): one box around all of it, and a box for each section along the slices.
+// Bounding volumes of a bone (Niu 2008, §5.2.1): one box around all of it, and one for each section along the slices.
 #pragma once
 #include <span>
 #include <vector>

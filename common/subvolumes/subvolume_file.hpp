@@ -1,6 +1,6 @@
-// The files of sub-volumes (Niu 2008, §5.2.1): a Meta file that lists them, and SBB1.dat, SBB2.dat ... with the HU of a
-// section each. Text has exactly one form. What differs from it is refused, so a file that was read is written back to
-// the same bytes.
+// The files of sub-volumes (Niu 2008, §5.2.1): a Meta file that lists them, and SBB1.dat, SBB2.dat ... with the HU of
+// a section each. Text has exactly one form. What differs from it is refused, so a file that was read is written back
+// to the same bytes.
 #pragma once
 #include <array>
 #include <cstdint>

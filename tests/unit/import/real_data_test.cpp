@@ -13,9 +13,12 @@
 #include "server/import/inv3_reader.hpp"
 #include "server/import/label_import.hpp"
 #include "server/import/raw_volume.hpp"
+#include "server/import/subvolume_report.hpp"
+#include "tests/support/scenes/fitted_femur.hpp"
 #include "tests/support/shared_data.hpp"
 #include "tests/support/temp_dir.hpp"
 #include "tests/unit/import/fixtures.hpp"
+#include "tests/unit/import/subvolume_checks.hpp"
 
 namespace osteon::import {
 namespace {
@@ -402,6 +405,72 @@ TEST_F(SharedScans, ATibiaGrowsFromItsCortex) {
   ASSERT_TRUE(grown) << grown.error().message;
   EXPECT_EQ(grown->found.islands[0].voxels, island->found.islands[1].voxels);
   EXPECT_EQ(grown->bone->volume_mm3(), island->bone->volume_mm3());
+}
+
+// The tables of a real bone, with a tool through the middle of its box.
+void expect_tables(CtScan scan) {
+  const auto input = input_of_scan(std::move(scan), imaging::kBoneThreshold_hu, keep_going);
+  ASSERT_TRUE(input) << input.error().message;
+  const Box box = coloured_box(LabelledVoxels{input->geometry, {}, input->bone}, bone_colours());
+  const Vec3 middle = box.centre_mm();
+  MeasureOptions options;
+  options.steps = {{*find_tool("burr-round-5"),
+                    {pose_along({box.min_mm.x(), middle.y(), middle.z()}, {0, 0, -1}),
+                     pose_along({box.max_mm.x(), middle.y(), middle.z()}, {0, 0, -1})},
+                    {}}};
+  const auto m = measure_sub_volumes(*input, options, keep_going);
+  ASSERT_TRUE(m) << m.error().message;
+  expect_consistent(*m);
+  EXPECT_GT(m->steps[0].walk.removed, 0);
+  std::printf("%s", to_text(*m).c_str());
+}
+
+TEST_F(SharedScans, SubVolumesOfTheTibia) {
+  auto scan = read_dicom_series(data_ / "tibia-dicom", keep_going);
+  ASSERT_TRUE(scan) << scan.error().message;
+  expect_tables(std::move(*scan));
+}
+
+TEST_F(SharedScans, SubVolumesOfTheHead) {
+  RawFormat format;
+  format.size = {64, 64, 93};
+  format.given.spacing_mm = Vec3(3.2, 3.2, 1.5);
+  format.given.intercept = -1024.0;
+  format.type = RawType::uint16;
+  auto scan = read_raw_volume(data_ / "headsq-raw", format, keep_going);
+  ASSERT_TRUE(scan) << scan.error().message;
+  expect_tables(std::move(*scan));
+}
+
+// The parameters of a phantom are fitted to the surface of a real femur.
+TEST_F(SharedScans, APhantomComesWithinThreeMillimetresOfAFemur) {
+  const auto mesh = read_stl(data_ / "bone-meshes/femur.stl");
+  ASSERT_TRUE(mesh) << mesh.error().message;
+  const test::FittedFemur femur = test::fit_femur(test::spread_points(*mesh, 3000));
+  for (const phantoms::NamedValue& value : femur.bone.parameters())
+    std::printf("[          ] %-26s %9.3f\n", std::string(value.name).c_str(), value.value);
+  const auto good = phantoms::check_femur(femur.parameters);
+  EXPECT_TRUE(good) << good.error().message;
+
+  // Both ways: from the mesh to the phantom, and from the phantom to the mesh.
+  const double to_phantom = test::distances_mm(femur, test::spread_points(*mesh, 20000)).cwiseAbs().mean();
+  double to_mesh = 0.0;
+  for (const Vec3& p : test::points_on(femur.bone, 1000))
+    to_mesh += test::distance_to_mesh_mm(*mesh, femur.pose_mesh_bone.point(p)) / 1000.0;
+  std::printf("[          ] mean distance to the phantom %.2f mm, to the mesh %.2f mm\n", to_phantom, to_mesh);
+  EXPECT_LE(to_phantom, 3.0);
+  EXPECT_LE(to_mesh, 3.0);
+
+  for (double part = 0.2; part < 0.76; part += 0.05) {
+    const test::ShaftPlane plane = test::shaft_plane(femur.parameters, part);
+    const test::SectionMoments real = test::section_of(*mesh, femur.pose_mesh_bone.inverse(), plane);
+    const test::SectionMoments ours = test::section_of(femur.bone, plane);
+    std::printf("[          ] at %.2f: area %.0f and %.0f mm2, second moments %.0f and %.0f, %.0f and %.0f mm4\n", part,
+                real.area, ours.area, real.xx, ours.xx, real.yy, ours.yy);
+    EXPECT_NEAR(ours.area, real.area, 0.15 * real.area) << part;
+    EXPECT_NEAR(ours.xx, real.xx, 0.15 * real.xx) << part;
+    EXPECT_NEAR(ours.yy, real.yy, 0.15 * real.yy) << part;
+  }
 }
 
 }  // namespace

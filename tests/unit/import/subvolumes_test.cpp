@@ -1,4 +1,4 @@
-// `osteon-import report`: tables of known bones and of real scans, its files, and its sentences.
+// `osteon-import report`: tables of known bones, its files, and its sentences.
 #include <gmock/gmock.h>
 
 #include <fstream>
@@ -7,13 +7,11 @@
 
 #include "common/runtime/files.hpp"
 #include "common/subvolumes/subvolume_file.hpp"
-#include "server/import/dicom_reader.hpp"
-#include "server/import/raw_volume.hpp"
 #include "server/import/subvolume_report.hpp"
 #include "tests/support/process.hpp"
-#include "tests/support/shared_data.hpp"
 #include "tests/support/temp_dir.hpp"
 #include "tests/unit/import/fixtures.hpp"
+#include "tests/unit/import/subvolume_checks.hpp"
 
 namespace osteon::import {
 namespace {
@@ -50,29 +48,6 @@ CarveStep through_the_foot() {
   return {*find_tool("burr-round-5"),
           {pose_along({2.0, 8.0, 4.0}, {0, 0, -1}), pose_along({16.0, 8.0, 4.0}, {0, 0, -1})},
           {}};
-}
-
-// What every table says, whatever the bone: all ways have one surface, and cutting takes the same voxels of each.
-void expect_consistent(const SubVolumeMeasures& m) {
-  EXPECT_GT(m.bone, 0);
-  EXPECT_EQ(m.object_box.triangles, m.original.triangles);
-  EXPECT_EQ(m.section_sum.triangles, m.original.triangles);
-  EXPECT_EQ(m.tree.triangles, m.original.triangles);
-  EXPECT_LE(m.object_box.voxels, m.original.voxels);
-  EXPECT_LE(m.section_sum.voxels, m.object_box.voxels);
-  EXPECT_LE(m.section_sum.file_bytes, m.original.file_bytes + 1000 * static_cast<std::int64_t>(m.sections.size()));
-  EXPECT_GE(m.section_sum.voxels, m.bone);
-  EXPECT_LE(m.listed_voxels, m.section_sum.voxels);
-  EXPECT_EQ(m.listed, m.subdivisions.back().all_full() + m.subdivisions.back().partly_full);
-  std::int64_t bone = m.bone;
-  for (const ActiveReport& step : m.steps) {
-    EXPECT_EQ(step.walk.removed, step.leaf_walk.removed);
-    bone -= step.walk.removed;
-    EXPECT_EQ(step.bone, bone);
-    EXPECT_EQ(step.leaf_bone, bone);
-    EXPECT_EQ(step.queued.size(), static_cast<std::size_t>(step.poses));
-    EXPECT_EQ(step.touched.size(), static_cast<std::size_t>(step.poses));
-  }
 }
 
 TEST(SubVolumeInput, IsTheLargestBone) {
@@ -307,50 +282,6 @@ TEST_F(SubVolumeProgram, SaysInOneSentenceWhatIsWrong) {
                 .exit_code,
             0);
   expect_sentence(test::run(OSTEON_IMPORT_PROGRAM, {"report", path("block")}), path("block"));
-}
-
-// Tables of real bones, with a tool through the middle of their box.
-class RealSubVolumes : public ::testing::Test {
- protected:
-  void SetUp() override {
-    const auto shared = test::find_shared();
-    if (!shared || !fs::is_directory(*shared / "data")) GTEST_SKIP() << "no shared/data beside the checkout";
-    data_ = *shared / "data";
-  }
-  void measure(CtScan scan) {
-    const auto input = input_of_scan(std::move(scan), imaging::kBoneThreshold_hu, keep_going);
-    ASSERT_TRUE(input) << input.error().message;
-    const Box box = coloured_box(LabelledVoxels{input->geometry, {}, input->bone}, bone_colours());
-    const Vec3 middle = box.centre_mm();
-    MeasureOptions options;
-    options.steps = {{*find_tool("burr-round-5"),
-                      {pose_along({box.min_mm.x(), middle.y(), middle.z()}, {0, 0, -1}),
-                       pose_along({box.max_mm.x(), middle.y(), middle.z()}, {0, 0, -1})},
-                      {}}};
-    const auto m = measure_sub_volumes(*input, options, keep_going);
-    ASSERT_TRUE(m) << m.error().message;
-    expect_consistent(*m);
-    EXPECT_GT(m->steps[0].walk.removed, 0);
-    std::printf("%s", to_text(*m).c_str());
-  }
-  fs::path data_;
-};
-
-TEST_F(RealSubVolumes, OfTheTibia) {
-  auto scan = read_dicom_series(data_ / "tibia-dicom", {}, keep_going);
-  ASSERT_TRUE(scan) << scan.error().message;
-  measure(std::move(*scan));
-}
-
-TEST_F(RealSubVolumes, OfTheHead) {
-  RawFormat format;
-  format.size = {64, 64, 93};
-  format.given.spacing_mm = Vec3(3.2, 3.2, 1.5);
-  format.given.intercept = -1024.0;
-  format.type = RawType::uint16;
-  auto scan = read_raw_volume(data_ / "headsq-raw", format, keep_going);
-  ASSERT_TRUE(scan) << scan.error().message;
-  measure(std::move(*scan));
 }
 
 }  // namespace

@@ -9,6 +9,7 @@
 
 #include "tests/support/scenes/random.hpp"
 #include "tests/unit/phantoms/islands.hpp"
+#include "tests/unit/phantoms/made_bones.hpp"
 
 namespace osteon::phantoms {
 namespace {
@@ -17,19 +18,6 @@ BoneRecipe recipe_of(Side side = Side::left) {
   BoneRecipe recipe;
   recipe.side = side;
   return recipe;
-}
-
-std::unique_ptr<PhantomBone> bone_of(const BoneRecipe& recipe) {
-  auto made = make_bone(recipe);
-  EXPECT_TRUE(made) << made.error().message;
-  return made ? std::move(*made) : nullptr;
-}
-
-Vec3 landmark(const PhantomBone& bone, const std::string& name) {
-  for (const Landmark& found : bone.anatomy().landmarks)
-    if (found.name == name) return found.point_mm;
-  ADD_FAILURE() << "no landmark " << name;
-  return Vec3::Zero();
 }
 
 PlannedAxis axis(const PhantomBone& bone, const std::string& name) {

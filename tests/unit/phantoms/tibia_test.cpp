@@ -6,34 +6,24 @@
 #include <numbers>
 
 #include "tests/support/scenes/random.hpp"
+#include "tests/unit/phantoms/made_bones.hpp"
 
 namespace osteon::phantoms {
 namespace {
 
-std::unique_ptr<PhantomBone> tibia_of(Side side) {
-  auto made = make_bone({.kind = "tibia", .side = side});
-  EXPECT_TRUE(made) << made.error().message;
-  return made ? std::move(*made) : nullptr;
-}
-
-Vec3 point_of(const PhantomBone& bone, const std::string& name) {
-  for (const Landmark& found : bone.anatomy().landmarks)
-    if (found.name == name) return found.point_mm;
-  ADD_FAILURE() << "no landmark " << name;
-  return Vec3::Zero();
-}
+std::unique_ptr<PhantomBone> tibia_of(Side side) { return bone_of({.kind = "tibia", .side = side}); }
 
 TEST(Tibia, LandmarksLieOnTheSurface) {
   const auto bone = tibia_of(Side::left);
   for (const char* name : {"tibial tuberosity", "medial malleolus", "lateral malleolus", "fibular head"})
-    EXPECT_NEAR(bone->depths(point_of(*bone, name)).surface_mm, 0.0, 0.05) << name;
+    EXPECT_NEAR(bone->depths(landmark(*bone, name)).surface_mm, 0.0, 0.05) << name;
 }
 
 TEST(Tibia, HasItsLengthAndSlope) {
   const auto bone = tibia_of(Side::left);
   const TibiaParameters p;
-  EXPECT_NEAR(-point_of(*bone, "medial malleolus").z(), p.length_mm, 1e-9);
-  EXPECT_NEAR(point_of(*bone, "fibular head").z() - point_of(*bone, "lateral malleolus").z(), p.fibula_length_mm, 1e-9);
+  EXPECT_NEAR(-landmark(*bone, "medial malleolus").z(), p.length_mm, 1e-9);
+  EXPECT_NEAR(landmark(*bone, "fibular head").z() - landmark(*bone, "lateral malleolus").z(), p.fibula_length_mm, 1e-9);
   // The plateau falls backwards: its height where a line from above meets the bone.
   const auto height = [&](double y) {
     double z = 40.0;
@@ -55,7 +45,7 @@ TEST(Tibia, RightIsTheMirrorImageOfLeft) {
     EXPECT_EQ(left->depths(at).surface_mm, right->depths(mirrored).surface_mm);
     EXPECT_EQ(left->depths(at).bone, right->depths(mirrored).bone);
   }
-  EXPECT_GT(point_of(*left, "fibular head").x(), 0.0);
+  EXPECT_GT(landmark(*left, "fibular head").x(), 0.0);
 }
 
 TEST(Tibia, EveryPresetIsATibiaWhoseBonesDoNotTouch) {
