@@ -256,11 +256,12 @@ TEST(SubVolumeInput, OfACaseInItsSourceIsThatOfTheSource) {
   EXPECT_EQ(placed->bone, whole.bone);
   EXPECT_EQ(placed->hu, whole.hu);
   EXPECT_EQ(placed->geometry, whole.geometry);
-  SubVolumeInput half_a_voxel = of_case, beyond = of_case, coarser = of_case;
+  SubVolumeInput half_a_voxel = of_case, beyond = of_case, before = of_case, coarser = of_case;
   half_a_voxel.geometry.origin_mm.x() += 0.25;
   beyond.geometry.origin_mm.z() += 2.0;
+  before.geometry.origin_mm.z() -= 2.0;
   coarser.geometry.axes_mm *= 1.01;
-  for (const SubVolumeInput& wrong : {half_a_voxel, beyond, coarser}) {
+  for (const SubVolumeInput& wrong : {half_a_voxel, beyond, before, coarser}) {
     const auto refused = input_in_source(wrong, shaft_scan(), "scan");
     ASSERT_FALSE(refused);
     EXPECT_THAT(refused.error().message, HasSubstr("--source"));

@@ -236,5 +236,23 @@ TEST(Femur, TwoHundredRandomFemursAreOneClosedPieceEach) {
   }
 }
 
+// The most bowed shaft stands out before the condyles and the head.
+TEST(Femur, BoundsContainTheBone) {
+  for (const double bow_radius_mm : {500.0, 943.0}) {
+    const auto bone =
+        bone_of({.kind = "femur", .changes = {{"bow_radius_mm", bow_radius_mm}, {"shaft_forward_mm", 31.0}}});
+    ASSERT_TRUE(bone);
+    const Box bounds = bone->bounds(), around = bounds.grown(20.0);
+    for (double x = around.min_mm.x(); x < around.max_mm.x(); x += 3.0)
+      for (double y = around.min_mm.y(); y < around.max_mm.y(); y += 3.0)
+        for (double z = around.min_mm.z(); z < around.max_mm.z(); z += 6.0) {
+          const Vec3 at(x, y, z);
+          if (bone->depths(at).surface_mm >= 0.0) continue;
+          ASSERT_TRUE((at.array() >= bounds.min_mm.array()).all() && (at.array() <= bounds.max_mm.array()).all())
+              << at.transpose();
+        }
+  }
+}
+
 }  // namespace
 }  // namespace osteon::phantoms
