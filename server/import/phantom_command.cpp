@@ -32,6 +32,7 @@ struct PhantomArguments {
   std::optional<double> pitch_mm;
   double width_mm = 20.0, slice_mm = 1.0;
   ScannerSettings scanner;
+  std::vector<const CLI::Option*> bone_options;  // which a block or a tube does not have
 };
 
 // Removes what a command wrote before it failed.
@@ -141,40 +142,35 @@ Result<std::string> run_phantom(const PhantomArguments& a, const StopSignal& sto
     return bad_input("a " + a.kind +
                      " needs --layers; write THICKNESS_MM:DENSITY_G_CM3,... such as 5:1.9,20:0.3,5:1.9");
   if (!layered && !a.layers.empty()) return bad_input("a " + a.kind + " has no --layers; leave them out");
-  for (const std::string* option : {&a.side, &a.preset, &a.condition, &a.parameters, &a.stl, &a.truth})
-    if (layered && !option->empty())
-      return bad_input(
-          "--side, --preset, --condition, --parameters, --stl and --truth are for a femur or a tibia; "
-          "leave them out for a " +
-          a.kind);
+  for (const CLI::Option* option : a.bone_options)
+    if (layered && option->count() > 0)
+      return bad_input(option->get_name() + " is for a femur or a tibia; leave it out for a " + a.kind);
   return layered ? run_layers(a, stop) : run_bone(a, stop);
 }
 
-void add_bone_options(CLI::App& phantom, PhantomArguments& a) {
-  phantom.add_option("--side", a.side, "Of a bone: left (default) or right")->check(CLI::IsMember({"left", "right"}));
-  phantom.add_option("--preset", a.preset, "Of a bone: female, male (default), small or large")
+// `dicom`: the option --dicom.
+void add_bone_options(CLI::App& phantom, CLI::Option* dicom, PhantomArguments& a) {
+  const auto text = [&](const char* name, std::string& value, const char* help) {
+    a.bone_options.push_back(phantom.add_option(name, value, help));
+    return phantom.get_option(name);
+  };
+  text("--side", a.side, "Of a bone: left (default) or right")->check(CLI::IsMember({"left", "right"}));
+  text("--preset", a.preset, "Of a bone: female, male (default), small or large")
       ->check(CLI::IsMember({"female", "male", "small", "large"}));
-  phantom.add_option("--condition", a.condition, "Of a bone: young, adult (default) or osteoporotic")
+  text("--condition", a.condition, "Of a bone: young, adult (default) or osteoporotic")
       ->check(CLI::IsMember({"young", "adult", "osteoporotic"}));
-  phantom.add_option("--parameters", a.parameters, "YAML file with these words and with parameters of the bone");
-  phantom.add_option("--stl", a.stl, "Also write the bone's surface to this STL file");
-  phantom.add_option("--truth", a.truth,
-                     "Also write parameters, landmarks, axes and labels of the bone, to this folder");
-  phantom.add_option("--pixel", a.scanner.pixel_mm, "Of --dicom of a bone: pixel of a slice, mm")
-      ->check(within(0.1, 5.0))
-      ->capture_default_str();
-  phantom.add_option("--slice", a.slice_mm, "Of --dicom of a bone: thickness and distance of slices, mm")
-      ->check(within(0.1, 10.0))
-      ->capture_default_str();
-  phantom.add_option("--blur", a.scanner.blur_mm, "Of --dicom of a bone: sigma of the scanner's blur, mm")
-      ->check(within(0.0, 5.0))
-      ->capture_default_str();
-  phantom.add_option("--noise", a.scanner.noise_hu, "Of --dicom of a bone: standard deviation of the noise, HU")
-      ->check(within(0.0, 500.0))
-      ->capture_default_str();
-  phantom.add_option("--tilt", a.scanner.tilt_degrees, "Of --dicom of a bone: tilt of the gantry, degrees")
-      ->check(within(-30.0, 30.0))
-      ->capture_default_str();
+  text("--parameters", a.parameters, "YAML file with these words and with parameters of the bone");
+  text("--stl", a.stl, "Also write the bone's surface to this STL file");
+  text("--truth", a.truth, "Also write parameters, landmarks, axes and labels of the bone, to this folder");
+  const auto scanner = [&](const char* name, double& value, double least, double most, const char* help) {
+    a.bone_options.push_back(
+        phantom.add_option(name, value, help)->check(within(least, most))->capture_default_str()->needs(dicom));
+  };
+  scanner("--pixel", a.scanner.pixel_mm, 0.1, 5.0, "Of --dicom of a bone: pixel of a slice, mm");
+  scanner("--slice", a.slice_mm, 0.1, 10.0, "Of --dicom of a bone: thickness and distance of slices, mm");
+  scanner("--blur", a.scanner.blur_mm, 0.0, 5.0, "Of --dicom of a bone: sigma of the scanner's blur, mm");
+  scanner("--noise", a.scanner.noise_hu, 0.0, 500.0, "Of --dicom of a bone: standard deviation of the noise, HU");
+  scanner("--tilt", a.scanner.tilt_degrees, -30.0, 30.0, "Of --dicom of a bone: tilt of the gantry, degrees");
 }
 
 }  // namespace
@@ -196,10 +192,10 @@ void add_phantom_command(CLI::App& app, std::vector<Command>& commands) {
       ->capture_default_str();
   phantom->add_option("--pitch", a.pitch_mm, "Voxel edge, mm (default: 0.4; of a bone 0.7)")->check(within(0.02, 10.0));
   phantom->add_option("--out", a.out, "Folder of the case, made by this command")->required();
-  phantom->add_option("--dicom", a.dicom,
-                      "Also write what a CT scanner would see of it, as a DICOM series, to this folder");
+  CLI::Option* dicom = phantom->add_option(
+      "--dicom", a.dicom, "Also write what a CT scanner would see of it, as a DICOM series, to this folder");
   phantom->add_option("--title", a.title, "Name shown to people");
-  add_bone_options(*phantom, a);
+  add_bone_options(*phantom, dicom, a);
   commands.push_back({phantom, [shared](const StopSignal& stop) { return run_phantom(*shared, stop); }});
 }
 

@@ -110,6 +110,10 @@ TEST(PhantomProgram, RefusesInOneSentenceAndWritesNothing) {
   refused({"femur", "--parameters", (folder / "bad.yaml").string()}, "neck_shaft_degrees is 150");
   refused({"femur", "--parameters", (folder / "none.yaml").string()}, "none.yaml");
   refused({"femur", "--layers", "5:1.9"}, "has no --layers");
+  refused({"femur", "--noise", "10"}, "--noise requires --dicom");
+  for (const char* option : {"--side", "--noise"})
+    refused({"block", "--layers", "5:1.9", "--dicom", out + "-ct", option, option[2] == 's' ? "left" : "10"},
+            std::string(option) + " is for a femur or a tibia; leave it out for a block");
   refused({"block"}, "needs --layers");
   refused({"tube", "--layers", "5:1.9", "--side", "left"}, "--side");
   refused({"femur", "--pitch", "0.03"}, "--pitch");
