@@ -130,14 +130,10 @@ Result<void> fits_beside(const char* name, double value, double least, double mo
   return bad_input(text.data());
 }
 
-template <class Curve>
-double slope_of(const Curve& curve, double x) {
+double slope_of(const Profile& curve, double x) {
   constexpr double kStep = 0.5;
   return (curve(x + kStep) - curve(x - kStep)) / (2.0 * kStep);
 }
-
-// From 0 at 0 to 0 at 1, and 1 at `top`.
-double arch(double t, double top) { return std::sin(std::numbers::pi * std::pow(t, std::log(0.5) / std::log(top))); }
 
 // The middle of the sacroiliac joint: a plane through the foremost lateral corner of the sacrum's base.
 double joint_x_at(const PelvisParameters& p, double y, double z) {
@@ -160,7 +156,7 @@ Result<void> check_pelvis(const PelvisParameters& p) {
   const double joint_mm = joint_x_at(p, kSpineSize * hips - p.posterior_spine_back_mm, p.posterior_spine_height_mm);
   const LowerHip at = lower_hip(p);
   const double wide_mm = (at.beside() - at.medial()).norm() - 18.0 * u,
-               high_mm = (at.ramus - at.below()).norm() - 12.0 * u;
+               high_mm = (at.ramus - at.below()).norm() - 9.0 * u;
   struct Row {
     const char* name;
     double value, least, most;
@@ -251,6 +247,8 @@ void Pelvis::place_sacrum() {
                                 {0.88 * length, 0.20 * width},
                                 {length, 0.08 * width}});
   const double depth = 17.0 * height / 112.0;
+  sacrum_middle_ = base + 0.5 * height * down;
+  sacrum_reach_mm_ = std::hypot(0.5 * height, 0.5 * width) + depth;
   sacrum_half_depth_ =
       Profile({{0.0, depth}, {0.3 * length, 0.8 * depth}, {0.6 * length, 0.55 * depth}, {length, 0.3 * depth}});
 }
@@ -273,9 +271,9 @@ void Pelvis::place_wing() {
   crest_rise_mm_ = crest_bulge_mm_ = std::numeric_limits<double>::infinity();
   for (double t = 0.1; t < 0.8; t += 0.01) {
     const double rise = p_.crest_height_mm - front - t * (back - front);
-    crest_rise_mm_ = std::min(crest_rise_mm_, rise / arch(t, kCrestTop));
+    crest_rise_mm_ = std::min(crest_rise_mm_, rise / arch(t, kCrestTop).value);
     const double beside = 0.5 * p_.crests_mm - spine_.x() - t * chord_mm_ * chord_.x() - 0.55 * p_.crest_mm * out_.x();
-    crest_bulge_mm_ = std::min(crest_bulge_mm_, beside / (out_.x() * arch(t, kCrestWidest)));
+    crest_bulge_mm_ = std::min(crest_bulge_mm_, beside / (out_.x() * arch(t, kCrestWidest).value));
   }
 
   // The floor goes from above the acetabulum along the brim to the sacroiliac joint.
@@ -290,7 +288,7 @@ void Pelvis::place_wing() {
                       {at(joint).x, 0.52 * back},
                       {chord_mm_, 0.70 * back}});
   front_ = Profile({{radius_mm_ + 4.0 * u, at(above).x - 6.0 * u},
-                    {0.5 * (radius_mm_ + front), at(above).x - 4.0 * u},
+                    {0.5 * (radius_mm_ + front), at(above).x - 8.0 * u},
                     {front - 9.0 * u, 4.5 * u},
                     {front, 2.0 * u}});
 }
@@ -300,9 +298,9 @@ void Pelvis::place_ilium() {
   const auto beside_joint = [&](double y, double z, double beyond) { return Vec3(joint_x(y, z) + beyond, y, z); };
   // A point in the middle of the wing, at a part of the chord and a part of the height there.
   const auto in_wing = [&](double t, double height) {
-    const double v = t * chord_mm_, z = floor_z_(v) + height * (crest_z(v) - floor_z_(v));
+    const double v = t * chord_mm_, z = floor_z_(v) + height * (crest_z(v).value - floor_z_(v));
     const double s = height + kHollow * height * (1.0 - height);
-    Vec3 at = spine_ + v * chord_ + (floor_out_(v) + s * (crest_out(v) - floor_out_(v))) * out_;
+    Vec3 at = spine_ + v * chord_ + (floor_out_(v) + s * (crest_out(v).value - floor_out_(v))) * out_;
     at.z() = z;
     return at;
   };
@@ -352,9 +350,9 @@ void Pelvis::place_pubis_and_ischium() {
       {at.ischium, 14.0 * u, upper_tuberosity, 11.5 * u, blend},
       {centre_ + Vec3(-0.5 * r, -0.1 * r, -0.75 * r), 10.0 * u, upper_tuberosity, 9.0 * u, blend},
       {on_ring(1.0, 0.0), 5.0 * u, upper_tuberosity, 8.0 * u, blend},
-      {on_ring(0.7, -0.7), 5.0 * u, at.tuberosity, 6.0 * u, blend},
+      {on_ring(0.7, -0.7), 5.0 * u, at.tuberosity, 5.0 * u, blend},
       {at.pubis_corner, 6.0 * u, on_ring(0.0, -1.0), 5.5 * u, blend},  // inferior ramus
-      {on_ring(0.0, -1.0), 5.5 * u, at.tuberosity, 6.0 * u, blend},
+      {on_ring(0.0, -1.0), 5.5 * u, at.tuberosity, 5.0 * u, blend},
       {upper_tuberosity, 11.5 * u, at.tuberosity, tuberosity, kKnobBlend * u},
       {at.ischium - Vec3(4.0 * u, 6.0 * u, 0.0), 9.0 * u, at.ischium - Vec3(22.0 * u, 23.0 * u, 2.0 * u), 3.0 * u,
        blend},  // ischial spine
@@ -367,14 +365,24 @@ void Pelvis::place_pubis_and_ischium() {
             kRimBlend};
 }
 
-double Pelvis::crest_z(double along_mm) const {
-  const double t = std::clamp(along_mm / chord_mm_, 0.0, 1.0);
-  return p_.spine_height_mm + t * (p_.posterior_spine_height_mm - p_.spine_height_mm) +
-         crest_rise_mm_ * arch(t, kCrestTop);
+// From 0 at 0 to 0 at 1, and 1 at `top`. Constant beyond.
+Pelvis::Slope Pelvis::arch(double part, double top) {
+  if (part <= 0.0 || part >= 1.0) return {};
+  const double power = std::log(0.5) / std::log(top), turn = std::numbers::pi * std::pow(part, power);
+  return {std::sin(turn), std::cos(turn) * turn * power / part};
 }
 
-double Pelvis::crest_out(double along_mm) const {
-  return crest_bulge_mm_ * arch(std::clamp(along_mm / chord_mm_, 0.0, 1.0), kCrestWidest);
+Pelvis::Slope Pelvis::crest_z(double along_mm) const {
+  const double t = along_mm / chord_mm_, within = std::clamp(t, 0.0, 1.0);
+  const double fall = p_.posterior_spine_height_mm - p_.spine_height_mm;
+  const Slope rise = arch(t, kCrestTop);
+  return {p_.spine_height_mm + within * fall + crest_rise_mm_ * rise.value,
+          ((t == within ? fall : 0.0) + crest_rise_mm_ * rise.slope) / chord_mm_};
+}
+
+Pelvis::Slope Pelvis::crest_out(double along_mm) const {
+  const Slope out = arch(along_mm / chord_mm_, kCrestWidest);
+  return {crest_bulge_mm_ * out.value, crest_bulge_mm_ * out.slope / chord_mm_};
 }
 
 double Pelvis::socket_mm(const Vec3& at) const {
@@ -386,12 +394,12 @@ double Pelvis::socket_mm(const Vec3& at) const {
 double Pelvis::wing_mm(const Vec3& at) const {
   const Vec3 from = at - spine_;
   const double v = from.dot(chord_), u = from.dot(out_), z = at.z();
-  const double top = crest_z(v), bottom = floor_z_(v), high = crest_out(v), low = floor_out_(v);
+  const Slope crest_z = this->crest_z(v), crest_out = this->crest_out(v);
+  const double top = crest_z.value, bottom = floor_z_(v), high = crest_out.value, low = floor_out_(v);
   const double t = std::clamp((z - bottom) / (top - bottom), 0.0, 1.0), s = t + kHollow * t * (1.0 - t);
   const double rise = (high - low) * (1.0 + kHollow * (1.0 - 2.0 * t)) / (top - bottom);
-  const double run = (1.0 - s) * slope_of(floor_out_, v) + s * slope_of([&](double w) { return crest_out(w); }, v);
-  const double steep = slope_of([&](double w) { return crest_z(w); }, v),
-               edge = (z - top) / std::sqrt(1.0 + steep * steep);
+  const double run = (1.0 - s) * slope_of(floor_out_, v) + s * crest_out.slope;
+  const double edge = (z - top) / std::sqrt(1.0 + crest_z.slope * crest_z.slope);
   const double thick = 0.5 * p_.wing_mm + 0.5 * (p_.crest_mm - p_.wing_mm) * smooth_step(edge, -18.0 * unit_mm_, -3.0);
   const double across = std::abs(u - low - s * (high - low)) / std::sqrt(1.0 + rise * rise + run * run);
   double d = smooth_max(across - thick, edge, kWingEdge);
@@ -501,7 +509,8 @@ std::vector<NamedValue> Pelvis::parameters() const { return values_of<PelvisPara
 
 BoneDepths Pelvis::depths(const Vec3& at_mm) const {
   const Vec3 at = in_left_half(at_mm);
-  const double hip = hip_mm(at), sacrum = sacrum_mm(at);
+  const double hip = hip_mm(at), around = (at - sacrum_middle_).norm() - sacrum_reach_mm_;
+  const double sacrum = around < hip ? sacrum_mm(at) : around;  // it is not asked where it is farther
   BoneDepths depths;
   depths.bone = sacrum < hip ? 3 : at_mm.x() >= 0.0 ? 1 : 2;
   depths.surface_mm = std::min(hip, sacrum);

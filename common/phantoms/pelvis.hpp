@@ -62,11 +62,15 @@ class Pelvis final : public PhantomBone {
     double radius_b_mm = 0.0;
     double blend_mm = 0.0;
   };
+  struct Slope {
+    double value = 0.0, slope = 0.0;
+  };
   // A place beside the sacrum: along its bowed axis from the base, and behind that axis.
   struct SacrumPlace {
     double along_mm = 0.0, behind_mm = 0.0;
   };
 
+  [[nodiscard]] static Slope arch(double part, double top);
   [[nodiscard]] static double limbs_mm(const Vec3& at, double d, std::span<const Limb> limbs);
   void place_sacrum();
   void place_wing();
@@ -75,8 +79,9 @@ class Pelvis final : public PhantomBone {
   [[nodiscard]] double joint_x(double y, double z) const;  // of the middle of the sacroiliac joint
   [[nodiscard]] double joint_mm(const Vec3& at) const;     // from there, positive in the ilium
   [[nodiscard]] double socket_mm(const Vec3& at) const;    // from the ball of the acetabulum, positive in bone
-  [[nodiscard]] double crest_z(double along_mm) const;     // height of the wing's upper edge along its chord
-  [[nodiscard]] double crest_out(double along_mm) const;   // how far it stands out there
+  // Along the wing's chord: the height of its upper edge, and how far that stands out.
+  [[nodiscard]] Slope crest_z(double along_mm) const;
+  [[nodiscard]] Slope crest_out(double along_mm) const;
   [[nodiscard]] double wing_mm(const Vec3& at) const;
   [[nodiscard]] double ilium_mm(const Vec3& at) const;  // cut off at the sacroiliac joint
   [[nodiscard]] double pubis_mm(const Vec3& at) const;  // with ischium and the wall of the acetabulum
@@ -112,7 +117,8 @@ class Pelvis final : public PhantomBone {
   Vec3 bow_centre_;
   Vec3 bow_forward_;  // from the middle of the axis to that centre
   Profile sacrum_half_width_, sacrum_half_depth_;
-  double joint_y_ = 0.0, joint_z_ = 0.0, joint_x_ = 0.0;
+  Vec3 sacrum_middle_;
+  double sacrum_reach_mm_ = 0.0;  // the sacrum lies within it around that
 };
 
 }  // namespace osteon::phantoms
