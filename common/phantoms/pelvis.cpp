@@ -18,8 +18,8 @@ constexpr double kSpineSize = 0.042, kTubercleSize = 0.036, kTuberositySize = 0.
 constexpr double kRing =
     5.0;  // radius of the border of the obturator foramen, beside hip centres that are 180 mm apart
 constexpr double kWall = 0.22;                           // of the acetabulum, as a part of its radius
-constexpr double kJointForward = 0.30, kJointUp = 0.16;  // slopes of the sacroiliac joint's x along y and z
-constexpr double kJointPart = 0.33;  // how far back its corner lies, as a part of the posterior spines'
+constexpr double kJointForward = 0.32, kJointUp = 0.16;  // slopes of the sacroiliac joint's x along y and z
+constexpr double kJointPart = 0.44;  // how far back its corner lies, as a part of the posterior spines'
 constexpr double kHollow = 0.35;     // how hollow the iliac fossa is
 constexpr double kCrestTop = 0.49, kCrestWidest = 0.41;  // where along its chord
 constexpr double kSacrumTilt = 20.0 * kToRadians;        // of the chord of its axis, backwards from below
@@ -83,7 +83,7 @@ PelvisParameters pelvis_preset(std::string_view name) {
     p.anteversion_degrees = 22.0;
     p.spines_mm = 232.0;
     p.crests_mm = 272.0;
-    p.posterior_spines_mm = 92.0;
+    p.posterior_spines_mm = 100.0;
     p.tubercles_mm = 62.0;
     p.tuberosities_mm = 130.0;
     p.sacrum_width_mm = 108.0;
@@ -135,10 +135,13 @@ double slope_of(const Profile& curve, double x) {
   return (curve(x + kStep) - curve(x - kStep)) / (2.0 * kStep);
 }
 
-// The middle of the sacroiliac joint: a plane through the foremost lateral corner of the sacrum's base.
+// The middle of the sacroiliac joint: a plane through the foremost lateral corner of the sacrum, which is a little
+// rounded.
 double joint_x_at(const PelvisParameters& p, double y, double z) {
-  return 0.5 * (p.sacrum_width_mm + p.sacroiliac_gap_mm) +
-         kJointForward * (y + kJointPart * p.posterior_spine_back_mm) + kJointUp * (z - p.posterior_spine_height_mm);
+  const double u = p.hip_centres_mm / 180.0;
+  const double corner_y = -kJointPart * p.posterior_spine_back_mm, corner_z = p.posterior_spine_height_mm - 7.0 * u;
+  return 0.5 * (p.sacrum_width_mm + p.sacroiliac_gap_mm) + u + kJointForward * (y - corner_y) +
+         kJointUp * (z - corner_z);
 }
 
 // In the directions of the left half: x lateral, y anterior, z up.
@@ -170,7 +173,7 @@ Result<void> check_pelvis(const PelvisParameters& p) {
       {"crests_mm", p.crests_mm, p.spines_mm + 20.0 * u, p.spines_mm + 70.0 * u, "spines_mm"},
       {"posterior_spine_back_mm", p.posterior_spine_back_mm, 0.52 * hips, 0.74 * hips, "hip_centres_mm"},
       {"posterior_spine_height_mm", p.posterior_spine_height_mm, 0.40 * hips, 0.60 * hips, "hip_centres_mm"},
-      {"posterior_spines_mm", p.posterior_spines_mm, 2.0 * joint_mm + 8.0 * u, 2.0 * joint_mm + 40.0 * u,
+      {"posterior_spines_mm", p.posterior_spines_mm, 2.0 * joint_mm + 9.0 * u, 2.0 * joint_mm + 40.0 * u,
        "sacrum_width_mm and posterior_spine_back_mm"},
       {"crest_height_mm", p.crest_height_mm,
        std::max(p.spine_height_mm + 40.0 * u, p.posterior_spine_height_mm + 25.0 * u), p.spine_height_mm + 90.0 * u,
@@ -281,7 +284,7 @@ void Pelvis::place_wing() {
   const Vec3 above(centre_.x() + 5.0 * u, 14.0 * u, 0.0);
   const Vec3 brim(centre_.x() - 19.0 * u, -38.0 * u, 0.0);
   const double y = -0.78 * p_.posterior_spine_back_mm;
-  const Vec3 joint(joint_x(y, 0.6 * back) + 9.0 * u, y, 0.0);
+  const Vec3 joint(joint_x(y, 0.6 * back) + 6.0 * u, y, 0.0);
   floor_out_ = Profile({at(above), at(brim), at(joint), {chord_mm_, at(posterior_spine_).y}});
   floor_z_ = Profile({{at(above).x, radius_mm_ - 4.0 * u},
                       {at(brim).x, 20.0 * u},
@@ -306,8 +309,8 @@ void Pelvis::place_ilium() {
   };
   const Vec3 lower_spine(centre_.x() + 0.28 * r, std::min(p_.plane_forward_mm - 14.0 * u, 0.85 * r), r + 5.0 * u);
   const Vec3 roof(centre_.x() - 2.0 * u, -2.0 * u, 0.85 * r);
-  const Vec3 buttress = beside_joint(-0.56 * p_.posterior_spine_back_mm, 0.56 * p_.posterior_spine_height_mm, 9.0 * u);
-  const Vec3 tail = beside_joint(-0.88 * p_.posterior_spine_back_mm, 0.68 * p_.posterior_spine_height_mm, 6.0 * u);
+  const Vec3 buttress = beside_joint(-0.56 * p_.posterior_spine_back_mm, 0.56 * p_.posterior_spine_height_mm, 5.0 * u);
+  const Vec3 tail = beside_joint(-0.88 * p_.posterior_spine_back_mm, 0.68 * p_.posterior_spine_height_mm, 3.5 * u);
   const double blend = kIliumBlend * u, knob = kKnobBlend * u;
   const Vec3 back = Vec3::UnitY() * -u;
   ilium_ = {
@@ -409,8 +412,12 @@ double Pelvis::wing_mm(const Vec3& at) const {
 }
 
 double Pelvis::limbs_mm(const Vec3& at, double d, std::span<const Limb> limbs) {
-  for (const Limb& limb : limbs)
+  for (const Limb& limb : limbs) {
+    // Beyond the blend's reach it changes nothing.
+    const double near = d + limb.blend_mm + limb.reach_mm;
+    if (near < 0.0 || (at - limb.middle).squaredNorm() > near * near) continue;
     d = smooth_min(d, round_cone_mm(at, limb.a, limb.radius_a_mm, limb.b, limb.radius_b_mm), limb.blend_mm);
+  }
   return d;
 }
 

@@ -17,7 +17,7 @@ struct PelvisParameters {
   double inclination_degrees = 40.0, anteversion_degrees = 18.0;
   double plane_forward_mm = 40.0;
   double spines_mm = 240.0, spine_height_mm = 72.0;
-  double posterior_spines_mm = 90.0, posterior_spine_height_mm = 88.0, posterior_spine_back_mm = 112.0;
+  double posterior_spines_mm = 98.0, posterior_spine_height_mm = 88.0, posterior_spine_back_mm = 112.0;
   double crests_mm = 280.0, crest_height_mm = 132.0;
   double wing_mm = 6.0, crest_mm = 13.0;
   double tubercles_mm = 60.0, tubercle_depth_mm = 15.0;
@@ -61,6 +61,9 @@ class Pelvis final : public PhantomBone {
     Vec3 b;
     double radius_b_mm = 0.0;
     double blend_mm = 0.0;
+    // A ball around it.
+    Vec3 middle = 0.5 * (a + b);
+    double reach_mm = 0.5 * (a - b).norm() + std::max(radius_a_mm, radius_b_mm);
   };
   struct Slope {
     double value = 0.0, slope = 0.0;
