@@ -68,8 +68,8 @@ class Femur final : public PhantomBone {
   [[nodiscard]] Box bounds() const override;
   [[nodiscard]] BoneDepths depths(const Vec3& at_mm) const override;
   [[nodiscard]] double cancellous_g_cm3(const Vec3& at_mm) const override;
-  [[nodiscard]] double cortical_g_cm3() const override { return p_.cortical_g_cm3; }
-  [[nodiscard]] double marrow_g_cm3() const override { return p_.marrow_g_cm3; }
+  [[nodiscard]] double cortical_g_cm3(int /*bone*/) const override { return p_.cortical_g_cm3; }
+  [[nodiscard]] double marrow_g_cm3(int /*bone*/) const override { return p_.marrow_g_cm3; }
 
  private:
   // All that follows is in the bone's own directions: x lateral, y anterior, z proximal. It is the same for both sides.

@@ -50,8 +50,8 @@ class Pelvis final : public PhantomBone {
   [[nodiscard]] Box bounds() const override;
   [[nodiscard]] BoneDepths depths(const Vec3& at_mm) const override;
   [[nodiscard]] double cancellous_g_cm3(const Vec3& at_mm) const override;
-  [[nodiscard]] double cortical_g_cm3() const override { return p_.cortical_g_cm3; }
-  [[nodiscard]] double marrow_g_cm3() const override { return p_.cancellous_g_cm3; }  // there is no canal
+  [[nodiscard]] double cortical_g_cm3(int /*bone*/) const override { return p_.cortical_g_cm3; }
+  [[nodiscard]] double marrow_g_cm3(int /*bone*/) const override { return p_.cancellous_g_cm3; }  // no canal
 
  private:
   // Two balls and their hull, which grows together with what is there.

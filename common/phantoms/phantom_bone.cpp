@@ -38,11 +38,11 @@ BoneTissue PhantomBone::tissue(const Vec3& at_mm) const {
 double PhantomBone::density_g_cm3(const Vec3& at_mm, double blur_mm) const {
   const BoneDepths at = depths(at_mm);
   const double inner = share_beyond(at.cortex_mm, blur_mm);
-  if (inner == 0.0) return cortical_g_cm3();
+  const double cortical = cortical_g_cm3(at.bone), marrow = marrow_g_cm3(at.bone);
+  if (inner == 0.0) return cortical;
   const double canal = share_beyond(at.marrow_mm, blur_mm);
-  const double within =
-      canal == 1.0 ? marrow_g_cm3() : canal * marrow_g_cm3() + (1.0 - canal) * cancellous_g_cm3(at_mm);
-  return inner * within + (1.0 - inner) * cortical_g_cm3();
+  const double within = canal == 1.0 ? marrow : canal * marrow + (1.0 - canal) * cancellous_g_cm3(at_mm);
+  return inner * within + (1.0 - inner) * cortical;
 }
 
 Result<std::unique_ptr<PhantomBone>> make_bone(const BoneRecipe& recipe) {

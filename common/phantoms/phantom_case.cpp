@@ -116,10 +116,11 @@ Result<CaseScan> scan_of(const PhantomBone& bone, const PhantomCaseOptions& opti
           continue;
         }
         const bool cortical = tissue == BoneTissue::cortical;
-        const double density = cortical                           ? bone.cortical_g_cm3()
+        const int number = bone.depths(at).bone;
+        const double density = cortical                           ? bone.cortical_g_cm3(number)
                                : tissue == BoneTissue::cancellous ? bone.cancellous_g_cm3(at)
-                                                                  : bone.marrow_g_cm3();
-        const int first = static_cast<int>(kTissueNames.size()) * (bone.depths(at).bone - 1);
+                                                                  : bone.marrow_g_cm3(number);
+        const int first = static_cast<int>(kTissueNames.size()) * (number - 1);
         scan.hu.push_back(hu_of(density));
         scan.labels.push_back(static_cast<std::uint8_t>(first + static_cast<int>(tissue)));
         scan.tissue.push_back(static_cast<std::uint8_t>(cortical ? Tissue::cortical : Tissue::trabecular));

@@ -1,5 +1,6 @@
 #include "server/import/phantom_export.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <numbers>
@@ -21,14 +22,17 @@ nlohmann::ordered_json numbers_of(const Vec3& v) { return {v.x(), v.y(), v.z()};
 
 BlurredHu blurred_hu(const phantoms::PhantomBone& bone, double blur_mm) {
   const auto hu = [](double density_g_cm3) { return imaging::hounsfield(imaging::kRho1995, density_g_cm3); };
-  return [&bone, blur_mm, hu, cortical = hu(bone.cortical_g_cm3()), marrow = hu(bone.marrow_g_cm3())](const Vec3& at) {
+  return [&bone, blur_mm, hu](const Vec3& at) {
     const phantoms::BoneDepths depths = bone.depths(at);
     if (depths.surface_mm > kBlurReach * blur_mm) return kAroundBone_hu;
-    double found = kAroundBone_hu + (cortical - kAroundBone_hu) * blurred_step(-depths.surface_mm, blur_mm);
+    const double cortical = hu(bone.cortical_g_cm3(depths.bone)), marrow = hu(bone.marrow_g_cm3(depths.bone));
+    const double in_bone = blurred_step(-depths.surface_mm, blur_mm);
+    const double found = kAroundBone_hu + (cortical - kAroundBone_hu) * in_bone;
     if (depths.cortex_mm > kBlurReach * blur_mm) return found;
     const double cancellous = hu(bone.cancellous_g_cm3(at));
     const double inner = cancellous + (marrow - cancellous) * blurred_step(-depths.marrow_mm, blur_mm);
-    return found + (inner - cortical) * blurred_step(-depths.cortex_mm, blur_mm);
+    // Where a bone is sawn, its surface is nearer than the inner face of cortex.
+    return found + (inner - cortical) * std::min(in_bone, blurred_step(-depths.cortex_mm, blur_mm));
   };
 }
 

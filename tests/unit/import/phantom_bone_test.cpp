@@ -191,7 +191,7 @@ void scan_and_compare(const phantoms::PhantomBone& bone, const CtOptions& option
         sum += (real ? 1.0 : 0.0) + (there ? 1.0 : 0.0);
         if (std::max(depths.surface_mm, -depths.cortex_mm) < -kCorticalInterior_mm) {
           cortical.found += there ? found->density_g_cm3(at) : 0.0;
-          cortical.truth += bone.cortical_g_cm3();
+          cortical.truth += bone.cortical_g_cm3(depths.bone);
         }
         if (depths.cortex_mm < -kCancellousInterior_mm && depths.marrow_mm > kCancellousInterior_mm) {
           cancellous.found += there ? found->density_g_cm3(at) : 0.0;

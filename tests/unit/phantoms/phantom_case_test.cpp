@@ -96,7 +96,7 @@ TEST(PhantomBoneCase, HuAreThoseOfTheDensity) {
     if (label == 0) {
       ASSERT_EQ(found->scan.hu[n], 40);
     } else if (label != 2) {
-      ASSERT_NEAR(density, label == 1 ? (*bone)->cortical_g_cm3() : (*bone)->marrow_g_cm3(), 1e-3);
+      ASSERT_NEAR(density, label == 1 ? (*bone)->cortical_g_cm3(1) : (*bone)->marrow_g_cm3(1), 1e-3);
     }
   }
 }
