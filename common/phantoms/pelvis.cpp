@@ -212,8 +212,9 @@ Result<PelvisParameters> pelvis_parameters(const BoneRecipe& recipe) {
   return p;
 }
 
-Pelvis::Pelvis(const PelvisParameters& parameters)
+Pelvis::Pelvis(const PelvisParameters& parameters, std::optional<Side> only)
     : p_(parameters),
+      only_(only),
       unit_mm_(parameters.hip_centres_mm / 180.0),
       radius_mm_(0.5 * parameters.acetabulum_diameter_mm),
       rim_mm_((parameters.acetabulum_depth - 1.0) * radius_mm_),
@@ -322,7 +323,7 @@ void Pelvis::place_ilium() {
       // The ends of the crest. Only one ball reaches to the tip of each spine, so the tip is where it is said to be.
       {in_wing(0.86, 0.75), 0.5 * p_.crest_mm, posterior_spine_ - 8.0 * back, 0.6 * spine, blend},
       {tail, 7.0 * u, posterior_spine_, spine, knob},
-      {in_wing(0.20, 0.92), 6.5 * u, spine_ + 6.0 * back, 6.5 * u, knob},
+      {in_wing(0.20, 0.92), 6.5 * u, spine_ + 5.0 * back, 7.0 * u, knob},
       {in_wing(0.12, 0.75), 5.5 * u, spine_, spine, knob},
   };
   ilium_bottom_ = -10.0 * u;
@@ -510,20 +511,29 @@ double Pelvis::sacrum_mm(const Vec3& at) const {
   return smooth_max(d, joint_mm(at) + 0.5 * p_.sacroiliac_gap_mm, kEdgeBlend);
 }
 
-std::vector<std::string> Pelvis::names() const { return {"left hip bone", "right hip bone", "sacrum"}; }
+std::vector<std::string> Pelvis::names() const {
+  if (only_) return {"hip bone"};
+  return {"left hip bone", "right hip bone", "sacrum"};
+}
 
 std::vector<NamedValue> Pelvis::parameters() const { return values_of<PelvisParameters>(p_, kPelvisFields); }
 
 BoneDepths Pelvis::depths(const Vec3& at_mm) const {
+  BoneDepths depths;
+  depths.marrow_mm = kNoMarrow_mm;
+  if (only_) {
+    const Vec3 at(*only_ == Side::left ? at_mm.x() : -at_mm.x(), -at_mm.y(), at_mm.z());
+    depths.surface_mm = hip_mm(at);
+    depths.cortex_mm = std::max(depths.surface_mm + p_.shell_mm, p_.subchondral_mm - socket_mm(at));
+    return depths;
+  }
   const Vec3 at = in_left_half(at_mm);
   const double hip = hip_mm(at), around = (at - sacrum_middle_).norm() - sacrum_reach_mm_;
   const double sacrum = around < hip ? sacrum_mm(at) : around;  // it is not asked where it is farther
-  BoneDepths depths;
   depths.bone = sacrum < hip ? 3 : at_mm.x() >= 0.0 ? 1 : 2;
   depths.surface_mm = std::min(hip, sacrum);
   depths.cortex_mm = depths.surface_mm + p_.shell_mm;
   if (depths.bone != 3) depths.cortex_mm = std::max(depths.cortex_mm, p_.subchondral_mm - socket_mm(at));
-  depths.marrow_mm = kNoMarrow_mm;
   return depths;
 }
 
@@ -545,7 +555,8 @@ BoneAnatomy Pelvis::anatomy() const {
       {"acetabular centre", centre_},
   };
   for (const double side : {1.0, -1.0}) {
-    const std::string prefix = side > 0.0 ? "left " : "right ";
+    if (only_ && (*only_ == Side::left) != (side > 0.0)) continue;
+    const std::string prefix = only_ ? "" : side > 0.0 ? "left " : "right ";
     const auto world = [&](const Vec3& at) { return Vec3(side * at.x(), 0.0 - at.y(), at.z()); };
     for (const auto& landmark : landmarks) found.landmarks.push_back({prefix + landmark.name, world(landmark.at)});
     found.axes.push_back({prefix + "acetabular opening", world(centre_), world(opening_)});
@@ -564,12 +575,20 @@ Box Pelvis::bounds() const {
     box.include(world + Vec3::Constant(radius_mm));
   };
   include(centre_, radius_mm_ * (1.0 + kWall));
+  include(pubis_top_, pubis_radius_mm_);
+  include(pubis_bottom_, pubis_radius_mm_);
   for (const auto& limbs : {ilium_, pubis_})
     for (const Limb& limb : limbs) {
       include(limb.a, limb.radius_a_mm);
       include(limb.b, limb.radius_b_mm);
     }
   include({0.5 * p_.crests_mm, 0.0, p_.crest_height_mm}, 0.0);
+  if (only_) {
+    box = box.grown(kBeyond_mm);
+    if (*only_ == Side::right)
+      box = {{-box.max_mm.x(), box.min_mm.y(), box.min_mm.z()}, {-box.min_mm.x(), box.max_mm.y(), box.max_mm.z()}};
+    return box;
+  }
   const double length = 2.0 * bow_half_ * bow_mm_;
   for (int step = 0; step <= 10; ++step) {
     const double along = 0.1 * step * length;

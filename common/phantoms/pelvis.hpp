@@ -1,6 +1,6 @@
 // A pelvis from parameters: two hip bones and a sacrum, which do not touch. It is its own mirror image.
 #pragma once
-#include <array>
+#include <optional>
 #include <span>
 
 #include "common/phantoms/bone_parameters.hpp"
@@ -41,8 +41,9 @@ struct PelvisParameters {
 // iliac spines and both pubic tubercles, is parallel to x and z.
 class Pelvis final : public PhantomBone {
  public:
-  // The parameters have passed check_pelvis().
-  explicit Pelvis(const PelvisParameters& parameters);
+  // The parameters have passed check_pelvis(). `only`: the hip bone of that side alone. Its landmarks and its axis have
+  // names without a side.
+  explicit Pelvis(const PelvisParameters& parameters, std::optional<Side> only = {});
 
   [[nodiscard]] std::vector<std::string> names() const override;
   [[nodiscard]] std::vector<NamedValue> parameters() const override;
@@ -96,6 +97,7 @@ class Pelvis final : public PhantomBone {
   // All points are in the directions of the left half: x lateral, y anterior, z up. `unit_mm` scales what has no
   // parameter.
   PelvisParameters p_;
+  std::optional<Side> only_;
   double unit_mm_;
   double radius_mm_, rim_mm_;  // of the acetabulum; its rim's plane along the opening, from the centre
   Vec3 centre_, opening_;

@@ -4,6 +4,7 @@
 #include <span>
 
 #include "common/phantoms/femur.hpp"
+#include "common/phantoms/hip.hpp"
 #include "common/phantoms/pelvis.hpp"
 #include "common/phantoms/tibia.hpp"
 
@@ -51,6 +52,7 @@ Result<std::unique_ptr<PhantomBone>> make_bone(const BoneRecipe& recipe) {
   if (auto known = check_word("the condition", recipe.condition, kConditions); !known)
     return tl::unexpected(known.error());
   if (recipe.kind == "tibia") return made<Tibia>(tibia_parameters(recipe), recipe.side);
+  if (recipe.kind == "hip") return make_hip(recipe);
   if (recipe.kind == "pelvis") {
     const auto parameters = pelvis_parameters(recipe);
     if (!parameters) return tl::unexpected(parameters.error());

@@ -81,7 +81,7 @@ class PhantomBone {
   [[nodiscard]] double density_g_cm3(const Vec3& at_mm, double blur_mm) const;
 };
 
-inline constexpr std::string_view kBoneKinds[] = {"femur", "tibia", "pelvis"};
+inline constexpr std::string_view kBoneKinds[] = {"femur", "tibia", "pelvis", "hip"};
 inline constexpr std::string_view kPresets[] = {"female", "male", "small", "large"};
 inline constexpr std::string_view kConditions[] = {"young", "adult", "osteoporotic"};
 
