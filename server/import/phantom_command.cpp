@@ -144,7 +144,7 @@ Result<std::string> run_phantom(const PhantomArguments& a, const StopSignal& sto
   if (!layered && !a.layers.empty()) return bad_input("a " + a.kind + " has no --layers; leave them out");
   for (const CLI::Option* option : a.bone_options)
     if (layered && option->count() > 0)
-      return bad_input(option->get_name() + " is for a femur or a tibia; leave it out for a " + a.kind);
+      return bad_input(option->get_name() + " is for a bone, such as a femur; leave it out for a " + a.kind);
   return layered ? run_layers(a, stop) : run_bone(a, stop);
 }
 
@@ -179,12 +179,14 @@ void add_phantom_command(CLI::App& app, std::vector<Command>& commands) {
   const auto shared = std::make_shared<PhantomArguments>();
   PhantomArguments& a = *shared;
   CLI::App* phantom = app.add_subcommand("phantom", "Make a case whose true shape and density are known");
+  std::vector<std::string> kinds{"block", "tube"};
+  kinds.insert(kinds.end(), std::begin(phantoms::kBoneKinds), std::end(phantoms::kBoneKinds));
   phantom
       ->add_option("KIND", a.kind,
-                   "block (layers from the top down), tube (layers from the outside in), femur, or tibia (with its "
-                   "fibula)")
+                   "block (layers from the top down), tube (layers from the outside in), femur, tibia (with its "
+                   "fibula), patella, or knee (femur, tibia, fibula and patella)")
       ->required()
-      ->check(CLI::IsMember({"block", "tube", "femur", "tibia"}));
+      ->check(CLI::IsMember(kinds));
   phantom->add_option("--layers", a.layers,
                       "Of a block or tube: THICKNESS_MM:DENSITY_G_CM3,... such as 5:1.9,20:0.3,5:1.9");
   phantom->add_option("--width", a.width_mm, "Edge of the block, or length of the tube, mm")
