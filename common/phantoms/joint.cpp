@@ -28,9 +28,30 @@ Box moved(const Box& box, const Pose& pose) {
   return found;
 }
 
+// Contains what a cut leaves of a box.
+Box kept(const Box& box, const std::optional<Cut>& cut) {
+  if (!cut) return box;
+  const auto corner = [&](int bits) {
+    return Vec3((bits & 1) != 0 ? box.max_mm.x() : box.min_mm.x(), (bits & 2) != 0 ? box.max_mm.y() : box.min_mm.y(),
+                (bits & 4) != 0 ? box.max_mm.z() : box.min_mm.z());
+  };
+  Box found;
+  for (int bits = 0; bits < 8; ++bits) {
+    const Vec3 a = corner(bits);
+    const double beyond_a = beyond_mm(cut, a);
+    if (beyond_a <= 0.0) found.include(a);
+    for (const int axis : {1, 2, 4}) {
+      const Vec3 b = corner(bits ^ axis);
+      const double beyond_b = beyond_mm(cut, b);
+      if (beyond_a <= 0.0 && beyond_b > 0.0) found.include(a + beyond_a / (beyond_a - beyond_b) * (b - a));
+    }
+  }
+  return found;
+}
+
 // The cells of a coarse lattice that the rest of a sawn bone may reach.
 Box box_of(const JointMember& member) {
-  const Box whole = member.bone->bounds();
+  const Box whole = kept(member.bone->bounds(), member.cut);
   if (!member.cut) return whole;
   const double reach = 0.5 * std::sqrt(3.0) * kBoxStep_mm;
   Box box;
@@ -38,7 +59,6 @@ Box box_of(const JointMember& member) {
     for (double y = whole.min_mm.y(); y <= whole.max_mm.y(); y += kBoxStep_mm)
       for (double z = whole.min_mm.z(); z <= whole.max_mm.z(); z += kBoxStep_mm) {
         const Vec3 middle = Vec3(x, y, z).array() + 0.5 * kBoxStep_mm;
-        if (beyond_mm(member.cut, middle) > reach) continue;
         if (member.bone->depths(middle).surface_mm > kSteepestJoint * reach) continue;
         box.include({x, y, z});
         box.include(Vec3(x, y, z).array() + kBoxStep_mm);
@@ -61,8 +81,8 @@ std::vector<Named> told_apart(std::vector<std::pair<std::string, Named>> all) {
 
 }  // namespace
 
-Joint::Joint(std::vector<JointMember> members, std::vector<NamedValue> parameters, std::vector<Structure> structures)
-    : parameters_(std::move(parameters)), structures_(std::move(structures)) {
+Joint::Joint(std::vector<JointMember> members, std::vector<NamedValue> parameters)
+    : parameters_(std::move(parameters)) {
   int bones = 0;
   for (JointMember& member : members) {
     const Pose back = member.pose.inverse();
@@ -164,7 +184,9 @@ std::vector<Structure> Joint::structures() const {
   for (const Placed& placed : members_)
     for (Structure& own : placed.member.bone->structures()) {
       if (std::ranges::find(structures_, own.name, &Structure::name) != structures_.end()) continue;
-      own.bounds = moved(own.bounds, placed.member.pose);
+      const Box left = kept(own.bounds, placed.member.cut);
+      if (left.empty()) continue;
+      own.bounds = moved(left, placed.member.pose);
       for (Vec3& at : own.line_mm) at = placed.member.pose.point(at);
       own.distance_mm = [this, distance = std::move(own.distance_mm), &placed](const Vec3& at_mm) {
         const Vec3 at = placed.back.point(at_mm);

@@ -32,8 +32,12 @@ class Joint final : public PhantomBone {
  public:
   // At least one member; their names differ. `parameters` are those of the joint itself; a member's parameter has the
   // member's name before it, such as femur.length_mm. So has a landmark, an axis or a structure whose name would occur
-  // twice: "femur, knee centre". `structures` are those of the joint, and replace those of members with equal names.
-  Joint(std::vector<JointMember> members, std::vector<NamedValue> parameters, std::vector<Structure> structures = {});
+  // twice: "femur, knee centre".
+  Joint(std::vector<JointMember> members, std::vector<NamedValue> parameters);
+  Joint(const Joint&) = delete;  // its structures point to it
+  Joint& operator=(const Joint&) = delete;
+  // Structures of the joint itself. They replace those of members with equal names.
+  void set_structures(std::vector<Structure> structures) { structures_ = std::move(structures); }
 
   [[nodiscard]] std::vector<std::string> names() const override;
   [[nodiscard]] std::vector<NamedValue> parameters() const override;

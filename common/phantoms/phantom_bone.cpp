@@ -5,6 +5,8 @@
 
 #include "common/phantoms/femur.hpp"
 #include "common/phantoms/hip.hpp"
+#include "common/phantoms/knee.hpp"
+#include "common/phantoms/patella.hpp"
 #include "common/phantoms/pelvis.hpp"
 #include "common/phantoms/tibia.hpp"
 
@@ -29,11 +31,19 @@ Result<std::unique_ptr<PhantomBone>> made(Result<Parameters> parameters, Side si
 
 }  // namespace
 
-BoneTissue PhantomBone::tissue(const Vec3& at_mm) const {
-  const BoneDepths at = depths(at_mm);
+BoneTissue tissue_of(const BoneDepths& at) {
   if (at.surface_mm >= 0.0) return BoneTissue::none;
   if (at.cortex_mm >= 0.0) return BoneTissue::cortical;
   return at.marrow_mm >= 0.0 ? BoneTissue::cancellous : BoneTissue::marrow;
+}
+
+Box PhantomBone::bounds_of_all() const {
+  Box box = bounds();
+  for (const Structure& structure : structures()) {
+    box.include(structure.bounds.min_mm);
+    box.include(structure.bounds.max_mm);
+  }
+  return box;
 }
 
 double PhantomBone::density_g_cm3(const Vec3& at_mm, double blur_mm) const {
@@ -51,6 +61,8 @@ Result<std::unique_ptr<PhantomBone>> make_bone(const BoneRecipe& recipe) {
   if (auto known = check_word("the preset", recipe.preset, kPresets); !known) return tl::unexpected(known.error());
   if (auto known = check_word("the condition", recipe.condition, kConditions); !known)
     return tl::unexpected(known.error());
+  if (recipe.kind == "knee") return make_knee(recipe);
+  if (recipe.kind == "patella") return made<Patella>(patella_parameters(recipe), recipe.side);
   if (recipe.kind == "tibia") return made<Tibia>(tibia_parameters(recipe), recipe.side);
   if (recipe.kind == "hip") return make_hip(recipe);
   if (recipe.kind == "pelvis") {

@@ -43,6 +43,8 @@ struct BoneDepths {
   int bone = 1;             // number of the nearest bone, from 1
 };
 
+[[nodiscard]] BoneTissue tissue_of(const BoneDepths& depths);
+
 struct BoneAnatomy {
   std::vector<Landmark> landmarks;
   std::vector<PlannedAxis> axes;
@@ -76,12 +78,13 @@ class PhantomBone {
   // They never reach into bone. The bone must outlive them.
   [[nodiscard]] virtual std::vector<Structure> structures() const { return {}; }
 
-  [[nodiscard]] BoneTissue tissue(const Vec3& at_mm) const;
+  [[nodiscard]] BoneTissue tissue(const Vec3& at_mm) const { return tissue_of(depths(at_mm)); }
+  [[nodiscard]] Box bounds_of_all() const;  // contains the bone and its structures
   // Mean of the density over `blur_mm` of depth, as samples of that pitch have it. Outside, cortex goes on.
   [[nodiscard]] double density_g_cm3(const Vec3& at_mm, double blur_mm) const;
 };
 
-inline constexpr std::string_view kBoneKinds[] = {"femur", "tibia", "pelvis", "hip"};
+inline constexpr std::string_view kBoneKinds[] = {"femur", "tibia", "patella", "knee", "pelvis", "hip"};
 inline constexpr std::string_view kPresets[] = {"female", "male", "small", "large"};
 inline constexpr std::string_view kConditions[] = {"young", "adult", "osteoporotic"};
 

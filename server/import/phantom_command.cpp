@@ -150,7 +150,7 @@ Result<std::string> run_phantom(const PhantomArguments& a, const StopSignal& sto
   if (!layered && !a.layers.empty()) return bad_input("a " + a.kind + " has no --layers; leave them out");
   for (const CLI::Option* option : a.bone_options)
     if (layered && option->count() > 0)
-      return bad_input(option->get_name() + " is for a bone such as a femur; leave it out for a " + a.kind);
+      return bad_input(option->get_name() + " is for a bone, such as a femur; leave it out for a " + a.kind);
   if (!a.side.empty() && phantoms::has_both_sides(a.kind))
     return bad_input("--side is for a bone of one side; leave it out for a " + a.kind + ", which has both sides");
   return layered ? run_layers(a, stop) : run_bone(a, stop);
@@ -188,12 +188,15 @@ void add_phantom_command(CLI::App& app, std::vector<Command>& commands) {
   const auto shared = std::make_shared<PhantomArguments>();
   PhantomArguments& a = *shared;
   CLI::App* phantom = app.add_subcommand("phantom", "Make a case whose true shape and density are known");
+  std::vector<std::string> kinds{"block", "tube"};
+  kinds.insert(kinds.end(), std::begin(phantoms::kBoneKinds), std::end(phantoms::kBoneKinds));
   phantom
       ->add_option("KIND", a.kind,
                    "block (layers from the top down), tube (layers from the outside in), femur, tibia (with its "
-                   "fibula), or pelvis (both hip bones and the sacrum)")
+                   "fibula), patella, knee (femur, tibia, fibula and patella), pelvis (both hip bones and the sacrum), "
+                   "or hip (one hip bone and the end of a femur)")
       ->required()
-      ->check(CLI::IsMember({"block", "tube", "femur", "tibia", "pelvis"}));
+      ->check(CLI::IsMember(kinds));
   phantom->add_option("--layers", a.layers,
                       "Of a block or tube: THICKNESS_MM:DENSITY_G_CM3,... such as 5:1.9,20:0.3,5:1.9");
   phantom->add_option("--width", a.width_mm, "Edge of the block, or length of the tube, mm")

@@ -22,12 +22,22 @@ nlohmann::ordered_json numbers_of(const Vec3& v) { return {v.x(), v.y(), v.z()};
 
 BlurredHu blurred_hu(const phantoms::PhantomBone& bone, double blur_mm) {
   const auto hu = [](double density_g_cm3) { return imaging::hounsfield(imaging::kRho1995, density_g_cm3); };
-  return [&bone, blur_mm, hu](const Vec3& at) {
+  const auto around = [structures = bone.structures(), blur_mm](const Vec3& at) {
+    double found = kAroundBone_hu;
+    for (const phantoms::Structure& structure : structures) {
+      const Box box = structure.bounds.grown(kBlurReach * blur_mm);
+      if ((at.array() < box.min_mm.array()).any() || (at.array() > box.max_mm.array()).any()) continue;
+      found += (structure.hu - kAroundBone_hu) * blurred_step(-structure.distance_mm(at), blur_mm);
+    }
+    return found;
+  };
+  return [&bone, blur_mm, hu, around](const Vec3& at) {
     const phantoms::BoneDepths depths = bone.depths(at);
-    if (depths.surface_mm > kBlurReach * blur_mm) return kAroundBone_hu;
+    const double beside = around(at);
+    if (depths.surface_mm > kBlurReach * blur_mm) return beside;
     const double cortical = hu(bone.cortical_g_cm3(depths.bone)), marrow = hu(bone.marrow_g_cm3(depths.bone));
     const double in_bone = blurred_step(-depths.surface_mm, blur_mm);
-    const double found = kAroundBone_hu + (cortical - kAroundBone_hu) * in_bone;
+    const double found = beside + (cortical - beside) * in_bone;
     if (depths.cortex_mm > kBlurReach * blur_mm) return found;
     const double cancellous = hu(bone.cancellous_g_cm3(at));
     const double inner = cancellous + (marrow - cancellous) * blurred_step(-depths.marrow_mm, blur_mm);
@@ -37,7 +47,7 @@ BlurredHu blurred_hu(const phantoms::PhantomBone& bone, double blur_mm) {
 }
 
 ScannerSettings scanner_around(const phantoms::PhantomBone& bone, ScannerSettings settings, double slice_mm) {
-  const Box box = bone.bounds();
+  const Box box = bone.bounds_of_all();
   const Vec3 size = box.size_mm() + Vec3::Constant(2.0 * kFieldAround_mm);
   const double tilt = std::abs(settings.tilt_degrees) * std::numbers::pi / 180.0;
   settings.centre_mm = box.centre_mm();
