@@ -5,6 +5,8 @@
 #include <limits>
 #include <numbers>
 
+#include "common/phantoms/structures.hpp"
+
 namespace osteon::phantoms {
 namespace {
 
@@ -14,7 +16,7 @@ constexpr double kIliumBlend = 9.0, kLimbBlend = 7.0, kKnobBlend = 5.5, kEdgeBle
                  kWingEdge = 3.0, kSacrumEdge = 4.0, kTunnelBlend = 2.0;
 // Radii of balls as parts of hip_centres_mm, and slopes and places of parts without a parameter. [A], by the look of
 // real bones.
-constexpr double kSpineSize = 0.042, kTubercleSize = 0.036, kTuberositySize = 0.068, kPubisSize = 0.045;
+constexpr double kIliacSpineSize = 0.042, kTubercleSize = 0.036, kTuberositySize = 0.068, kPubisSize = 0.045;
 constexpr double kRing =
     5.0;  // radius of the border of the obturator foramen, beside hip centres that are 180 mm apart
 constexpr double kWall = 0.22;                           // of the acetabulum, as a part of its radius
@@ -26,7 +28,7 @@ constexpr double kSacrumTilt = 20.0 * kToRadians;        // of the chord of its 
 constexpr double kSacrumBow = 0.11;                      // of its axis, as a part of its height
 constexpr double kSymphysisTilt = 35.0 * kToRadians;     // backwards from below
 constexpr double kPelvisGrain_mm = 1.5;
-constexpr double kNoMarrow_mm = 1e3;
+constexpr double kNoCanal_mm = 1e3;
 
 using PelvisField = ParameterField<PelvisParameters>;
 using B = PelvisParameters;
@@ -60,6 +62,7 @@ constexpr PelvisField kPelvisFields[] = {
     {"sacroiliac_gap_mm", &B::sacroiliac_gap_mm, 1.5, 6.0},
     {"shell_mm", &B::shell_mm, 0.6, 3.0},
     {"subchondral_mm", &B::subchondral_mm, 0.8, 5.0},
+    {"cartilage_mm", &B::cartilage_mm, 0.5, 4.0},
     {"cortical_g_cm3", &B::cortical_g_cm3, 1.5, 2.1},
     {"cancellous_g_cm3", &B::cancellous_g_cm3, 0.05, 0.8},
     {"texture", &B::texture, 0.0, 0.5},
@@ -144,9 +147,6 @@ double joint_x_at(const PelvisParameters& p, double y, double z) {
          kJointUp * (z - corner_z);
 }
 
-// In the directions of the left half: x lateral, y anterior, z up.
-Vec3 in_left_half(const Vec3& at_mm) { return {std::abs(at_mm.x()), -at_mm.y(), at_mm.z()}; }
-
 }  // namespace
 
 std::span<const ParameterField<PelvisParameters>> pelvis_fields() { return kPelvisFields; }
@@ -156,7 +156,8 @@ Result<void> check_pelvis(const PelvisParameters& p) {
     if (const double value = p.*field.value; !(value >= field.least && value <= field.most))
       return bad_parameter(field.name, value, field.least, field.most);
   const double hips = p.hip_centres_mm, u = hips / 180.0, r = 0.5 * p.acetabulum_diameter_mm;
-  const double joint_mm = joint_x_at(p, kSpineSize * hips - p.posterior_spine_back_mm, p.posterior_spine_height_mm);
+  const double joint_mm =
+      joint_x_at(p, kIliacSpineSize * hips - p.posterior_spine_back_mm, p.posterior_spine_height_mm);
   const LowerHip at = lower_hip(p);
   const double wide_mm = (at.beside() - at.medial()).norm() - 18.0 * u,
                high_mm = (at.ramus - at.below()).norm() - 9.0 * u;
@@ -222,7 +223,7 @@ Pelvis::Pelvis(const PelvisParameters& parameters, std::optional<Side> only)
   const double inclination = p_.inclination_degrees * kToRadians, anteversion = p_.anteversion_degrees * kToRadians;
   opening_ = {std::cos(anteversion) * std::sin(inclination), std::sin(anteversion),
               -std::cos(anteversion) * std::cos(inclination)};
-  const double spine = kSpineSize * p_.hip_centres_mm;
+  const double spine = kIliacSpineSize * p_.hip_centres_mm;
   spine_ = {0.5 * p_.spines_mm, p_.plane_forward_mm - spine, p_.spine_height_mm};
   posterior_spine_ = {0.5 * p_.posterior_spines_mm, spine - p_.posterior_spine_back_mm, p_.posterior_spine_height_mm};
   const LowerHip lower = lower_hip(p_);
@@ -298,7 +299,7 @@ void Pelvis::place_wing() {
 }
 
 void Pelvis::place_ilium() {
-  const double u = unit_mm_, spine = kSpineSize * p_.hip_centres_mm, r = radius_mm_;
+  const double u = unit_mm_, spine = kIliacSpineSize * p_.hip_centres_mm, r = radius_mm_;
   const auto beside_joint = [&](double y, double z, double beyond) { return Vec3(joint_x(y, z) + beyond, y, z); };
   // A point in the middle of the wing, at a part of the chord and a part of the height there.
   const auto in_wing = [&](double t, double height) {
@@ -387,6 +388,17 @@ Pelvis::Slope Pelvis::crest_z(double along_mm) const {
 Pelvis::Slope Pelvis::crest_out(double along_mm) const {
   const Slope out = arch(along_mm / chord_mm_, kCrestWidest);
   return {crest_bulge_mm_ * out.value, crest_bulge_mm_ * out.slope / chord_mm_};
+}
+
+Vec3 Pelvis::own(const Vec3& at_mm) const {
+  const double x = !only_ ? std::abs(at_mm.x()) : *only_ == Side::left ? at_mm.x() : -at_mm.x();
+  return {x, -at_mm.y(), at_mm.z()};
+}
+
+double Pelvis::lunate_mm(const Vec3& at) const {
+  const Vec3 from = at - centre_;
+  const double fossa = round_cone_mm(at, fossa_.a, fossa_.radius_a_mm, fossa_.b, fossa_.radius_b_mm);
+  return std::max({from.norm() - radius_mm_ - 1.0, from.dot(opening_) - rim_mm_, -fossa});
 }
 
 double Pelvis::socket_mm(const Vec3& at) const {
@@ -519,16 +531,16 @@ std::vector<std::string> Pelvis::names() const {
 std::vector<NamedValue> Pelvis::parameters() const { return values_of<PelvisParameters>(p_, kPelvisFields); }
 
 BoneDepths Pelvis::depths(const Vec3& at_mm) const {
+  const Vec3 at = own(at_mm);
+  const double hip = hip_mm(at);
   BoneDepths depths;
-  depths.marrow_mm = kNoMarrow_mm;
+  depths.marrow_mm = kNoCanal_mm;
   if (only_) {
-    const Vec3 at(*only_ == Side::left ? at_mm.x() : -at_mm.x(), -at_mm.y(), at_mm.z());
-    depths.surface_mm = hip_mm(at);
-    depths.cortex_mm = std::max(depths.surface_mm + p_.shell_mm, p_.subchondral_mm - socket_mm(at));
+    depths.surface_mm = hip;
+    depths.cortex_mm = std::max(hip + p_.shell_mm, p_.subchondral_mm - socket_mm(at));
     return depths;
   }
-  const Vec3 at = in_left_half(at_mm);
-  const double hip = hip_mm(at), around = (at - sacrum_middle_).norm() - sacrum_reach_mm_;
+  const double around = (at - sacrum_middle_).norm() - sacrum_reach_mm_;
   const double sacrum = around < hip ? sacrum_mm(at) : around;  // it is not asked where it is farther
   depths.bone = sacrum < hip ? 3 : at_mm.x() >= 0.0 ? 1 : 2;
   depths.surface_mm = std::min(hip, sacrum);
@@ -538,12 +550,27 @@ BoneDepths Pelvis::depths(const Vec3& at_mm) const {
 }
 
 double Pelvis::cancellous_g_cm3(const Vec3& at_mm) const {
-  return p_.cancellous_g_cm3 * (1.0 + p_.texture * grain_noise(in_left_half(at_mm), kPelvisGrain_mm));
+  return p_.cancellous_g_cm3 * (1.0 + p_.texture * grain_noise(own(at_mm), kPelvisGrain_mm));
+}
+
+std::vector<Structure> Pelvis::structures() const {
+  std::vector<Structure> found;
+  for (const double side : {1.0, -1.0}) {
+    if (only_ && (*only_ == Side::left) != (side > 0.0)) continue;
+    const Vec3 centre(side * centre_.x(), 0.0, 0.0);
+    const std::string name = only_ ? "" : side > 0.0 ? "left " : "right ";
+    found.push_back(cartilage(
+        name + "acetabular cartilage", p_.cartilage_mm,
+        Box{centre.array() - radius_mm_, centre.array() + radius_mm_}.grown(1.0),
+        [this](const Vec3& at_mm) { return hip_mm(own(at_mm)); },
+        [this](const Vec3& at_mm) { return lunate_mm(own(at_mm)); }));
+  }
+  return found;
 }
 
 BoneAnatomy Pelvis::anatomy() const {
   BoneAnatomy found;
-  const double spine = kSpineSize * p_.hip_centres_mm;
+  const double spine = kIliacSpineSize * p_.hip_centres_mm;
   const struct {
     const char* name;
     Vec3 at;

@@ -27,6 +27,7 @@ struct PelvisParameters {
   double sacrum_width_mm = 108.0, sacrum_height_mm = 112.0;
   double symphysis_gap_mm = 4.0, sacroiliac_gap_mm = 2.5;
   double shell_mm = 1.4, subchondral_mm = 2.2;
+  double cartilage_mm = 2.0;
   double cortical_g_cm3 = 1.9;
   double cancellous_g_cm3 = 0.22;
   double texture = 0.1;
@@ -51,6 +52,7 @@ class Pelvis final : public PhantomBone {
   [[nodiscard]] Box bounds() const override;
   [[nodiscard]] BoneDepths depths(const Vec3& at_mm) const override;
   [[nodiscard]] double cancellous_g_cm3(const Vec3& at_mm) const override;
+  [[nodiscard]] std::vector<Structure> structures() const override;
   [[nodiscard]] double cortical_g_cm3(int /*bone*/) const override { return p_.cortical_g_cm3; }
   [[nodiscard]] double marrow_g_cm3(int /*bone*/) const override { return p_.cancellous_g_cm3; }  // no canal
 
@@ -76,12 +78,15 @@ class Pelvis final : public PhantomBone {
 
   [[nodiscard]] static Slope arch(double part, double top);
   [[nodiscard]] static double limbs_mm(const Vec3& at, double d, std::span<const Limb> limbs);
+  // In the directions of the left half: x lateral, y anterior, z up.
+  [[nodiscard]] Vec3 own(const Vec3& at_mm) const;
   void place_sacrum();
   void place_wing();
   void place_ilium();
   void place_pubis_and_ischium();
   [[nodiscard]] double joint_x(double y, double z) const;  // of the middle of the sacroiliac joint
   [[nodiscard]] double joint_mm(const Vec3& at) const;     // from there, positive in the ilium
+  [[nodiscard]] double lunate_mm(const Vec3& at) const;    // negative where the cartilage of the acetabulum lies
   [[nodiscard]] double socket_mm(const Vec3& at) const;    // from the ball of the acetabulum, positive in bone
   // Along the wing's chord: the height of its upper edge, and how far that stands out.
   [[nodiscard]] Slope crest_z(double along_mm) const;
@@ -94,8 +99,7 @@ class Pelvis final : public PhantomBone {
   [[nodiscard]] Vec3 in_sacrum(double x, const SacrumPlace& place) const;
   [[nodiscard]] double sacrum_mm(const Vec3& at) const;
 
-  // All points are in the directions of the left half: x lateral, y anterior, z up. `unit_mm` scales what has no
-  // parameter.
+  // All points are in those directions. `unit_mm` scales what has no parameter.
   PelvisParameters p_;
   std::optional<Side> only_;
   double unit_mm_;
