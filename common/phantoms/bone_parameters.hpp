@@ -53,7 +53,8 @@ template <class Parameters>
 [[nodiscard]] std::vector<NamedValue> values_of(const Parameters& parameters,
                                                 std::span<const ParameterField<Parameters>> fields) {
   std::vector<NamedValue> values;
-  for (const auto& field : fields) values.push_back({field.name, parameters.*field.value, field.least, field.most});
+  for (const auto& field : fields)
+    values.push_back({std::string(field.name), parameters.*field.value, field.least, field.most});
   return values;
 }
 

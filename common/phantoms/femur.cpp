@@ -2,9 +2,11 @@
 
 #include <cmath>
 #include <cstdio>
+#include <limits>
 #include <numbers>
 
 #include "common/geometry/triangle_distance.hpp"
+#include "common/phantoms/structures.hpp"
 
 namespace osteon::phantoms {
 namespace {
@@ -21,7 +23,9 @@ constexpr double kIsthmus = 0.52;     // where the neck is narrowest, as a part 
 constexpr double kNeckFlare = 1.3;    // how much it widens towards the shaft
 constexpr double kLesserTurn = 45.0;  // degrees by which the lesser trochanter lies behind medial
 constexpr double kFlarePart = 0.09, kFlareWidth = 1.3, kFlareDepth = 1.0;  // of the shaft above the condyles
-constexpr double kGrain_mm = 1.5;                                          // of the texture
+constexpr double kHiatus = 0.26;     // where the femoral artery passes behind the shaft, as a part of the length
+constexpr double kHollow_mm = 50.0;  // that vessels and nerves span
+constexpr double kGrain_mm = 1.5;    // of the texture
 
 using Field = ParameterField<FemurParameters>;
 using P = FemurParameters;
@@ -68,6 +72,7 @@ constexpr Field kFields[] = {
     {"lateral_condyle_radius_mm", &P::lateral_condyle_radius_mm, 14.0, 28.0},
     {"condyle_width_mm", &P::condyle_width_mm, 18.0, 36.0},
     {"notch_width_mm", &P::notch_width_mm, 12.0, 30.0},
+    {"cartilage_mm", &P::cartilage_mm, 0.5, 6.0},
     {"cortical_g_cm3", &P::cortical_g_cm3, 1.5, 2.1},
     {"cancellous_g_cm3", &P::cancellous_g_cm3, 0.05, 0.8},
     {"compressive_g_cm3", &P::compressive_g_cm3, 0.05, 0.95},
@@ -247,6 +252,7 @@ void Femur::place_shaft() {
   const double x = 0.5 * (p_.notch_width_mm + p_.condyle_width_mm);
   medial_ = {-x, r, Vec3::Zero(), {0.0, p_.condyle_depth_mm - 2.0 * r, kCondyleLift * r}};
   lateral_condyle_ = {x, l, {0.0, l - r, l - r}, {0.0, p_.condyle_depth_mm - r - l, l - r + kCondyleLift * l}};
+  trochlea_ = {0.0, p_.condyle_depth_mm - r - kGroove * r - kTrochleaSize * r, 0.5 * r};
   bottom_ = 0.35 * r;
 }
 
@@ -336,10 +342,9 @@ double Femur::proximal_mm(const Vec3& at, double shaft) const {
 }
 
 double Femur::distal_mm(const Vec3& at, double shaft) const {
-  const double r = p_.medial_condyle_radius_mm, groove = kTrochleaSize * r;
-  const double y = p_.condyle_depth_mm - r - kGroove * r - groove;
-  const double trochlea =
-      std::sqrt(squared_distance(at, {medial_.x, y, 0.5 * r}, {lateral_condyle_.x, y, 0.5 * r})) - groove;
+  const double r = p_.medial_condyle_radius_mm;
+  const Vec3 across = medial_.x * Vec3::UnitX();
+  const double trochlea = std::sqrt(squared_distance(at, trochlea_ + across, trochlea_ - across)) - kTrochleaSize * r;
   double d = std::min(condyle_mm(medial_, at), condyle_mm(lateral_condyle_, at));
   d = smooth_min(smooth_min(d, trochlea, kTrochleaBlend), shaft, kCondyleBlend);
   for (const Condyle* condyle : {&medial_, &lateral_condyle_}) {
@@ -422,6 +427,86 @@ BoneAnatomy Femur::anatomy() const {
   axis("neck axis", neck_base_, neck_);
   axis("transepicondylar axis", medial, lateral - medial);
   axis("posterior condylar axis", beyond(medial_, -Vec3::UnitY()), Vec3::UnitX());
+  return found;
+}
+
+double Femur::condyles_reach_mm(const Vec3& way) const {
+  double least = std::numeric_limits<double>::infinity();
+  for (const Condyle* condyle : {&medial_, &lateral_condyle_})
+    for (const Vec3& centre : {condyle->posterior, condyle->anterior})
+      least = std::min(least, way.dot(world(centre)) - condyle->radius_mm);
+  return least;
+}
+
+double Femur::joint_face_mm(const Vec3& at) const {
+  // The groove, seen from its middle, and the rounds of the condyles, but for what faces up.
+  constexpr double kGrooveSpan = 0.66, kUpwards = 0.7, kFacePart = 0.8;
+  const double y = at.y() - trochlea_.y(), z = at.z() - trochlea_.z();
+  double face = std::max(std::abs(at.x()) - lateral_condyle_.x, kGrooveSpan * std::hypot(y, z) - y);
+  for (const Condyle* condyle : {&medial_, &lateral_condyle_}) {
+    const Vec3 in_plane(0.0, at.y(), at.z()), along = condyle->anterior - condyle->posterior;
+    const double t = std::clamp((in_plane - condyle->posterior).dot(along) / along.squaredNorm(), 0.0, 1.0);
+    const Vec3 out = in_plane - condyle->posterior - t * along;
+    face = std::min(face, std::max(std::abs(at.x() - condyle->x) - kFacePart * 0.5 * p_.condyle_width_mm,
+                                   out.z() - kUpwards * out.norm()));
+  }
+  return face;
+}
+
+std::vector<Structure> Femur::structures() const {
+  const Distance bone = [this](const Vec3& at_mm) { return surface_mm(own(at_mm)); };
+  const Distance own_bone = [this](const Vec3& at) { return surface_mm(at); };
+  const double r = p_.medial_condyle_radius_mm, radius = head_radius_mm_, thickness = p_.cartilage_mm;
+  const Vec3 head = world(head_), neck = world(neck_);
+  std::vector<Structure> found;
+  found.push_back(cartilage("femoral head cartilage", thickness,
+                            Box{head.array() - radius, head.array() + radius}.grown(thickness), bone,
+                            [head, neck, radius](const Vec3& at) { return -0.3 * radius - neck.dot(at - head); }));
+  Box knee;
+  knee.include(world({-0.5 * p_.bicondylar_width_mm, -1.2 * r, -1.2 * r}));
+  knee.include(world({0.5 * p_.bicondylar_width_mm, p_.condyle_depth_mm - r, 1.4 * r}));
+  found.push_back(cartilage("femoral condyle cartilage", thickness, knee.grown(thickness), bone,
+                            [this](const Vec3& at) { return joint_face_mm(own(at)); }));
+
+  // Inside the notch: the anterior cruciate ligament behind and above at the lateral condyle, the posterior one before
+  // and below at the medial condyle.
+  const auto wall = [&](const Condyle& condyle, double y, double z) {
+    return world(surface_from({condyle.x, y * r, z * r}, {condyle.x > 0.0 ? -1.0 : 1.0, 0.0, 0.0}, own_bone));
+  };
+  const Vec3 medial = world(epicondyle(medial_)), lateral = world(epicondyle(lateral_condyle_));
+  found.push_back(footprint("anterior cruciate ligament, femur", wall(lateral_condyle_, -0.25, 0.35), 5.5, bone));
+  found.push_back(footprint("posterior cruciate ligament, femur", wall(medial_, 0.15, -0.25), 6.0, bone));
+  found.push_back(footprint("medial collateral ligament, femur", medial, 5.0, bone));
+  found.push_back(footprint("lateral collateral ligament, femur", lateral, 4.0, bone));
+
+  const auto shaft = [&](double part_of_length) { return shaft_centre(height_of(part_of_length)); };
+  const auto line = [&](const std::vector<Beside>& points) {
+    std::vector<Vec3> made = line_beside(points, kHollow_mm, own_bone);
+    for (Vec3& at : made) at = world(at);
+    return made;
+  };
+  // From before the head to the medial side, and behind the shaft where the popliteal artery begins.
+  const Vec3 groin = head_ + 0.5 * radius * Vec3::UnitZ();
+  const Beside hiatus{shaft(kHiatus), {-0.75, -0.65, 0.0}, 10.0};
+  std::vector<Vec3> femoral = line({{groin, {0.0, 1.0, 0.0}, 18.0},
+                                    {shaft(0.75), {-0.45, 0.9, 0.0}, 28.0},
+                                    {shaft(0.5), {-0.85, 0.5, 0.0}, 20.0},
+                                    {shaft(0.32), {-1.0, -0.2, 0.0}, 12.0},
+                                    hiatus});
+  std::vector<Vec3> popliteal = line({hiatus,
+                                      {shaft(0.17), {-0.1, -1.0, 0.0}, 9.0},
+                                      {{0.0, 0.0, 0.5 * r}, {0.0, -1.0, 0.0}, 10.0},
+                                      {{0.0, 0.0, -r}, {0.0, -1.0, 0.0}, 10.0}});
+  popliteal.insert(popliteal.begin(), femoral.back());
+  // Between the greater trochanter and the ischium, and behind the shaft.
+  const Vec3 buttock = neck_base_ + 0.4 * neck_length_mm_ * neck_ + radius * Vec3::UnitZ();
+  std::vector<Vec3> sciatic = line({{buttock, {0.0, -1.0, 0.0}, 16.0},
+                                    {shaft(0.7), {0.0, -1.0, 0.0}, 20.0},
+                                    {shaft(0.45), {0.0, -1.0, 0.0}, 18.0},
+                                    {shaft(kHiatus), {0.0, -1.0, 0.0}, 17.0}});
+  found.push_back(tube("femoral artery", LabelKind::vessel, std::move(femoral), 4.5, bone));
+  found.push_back(tube("popliteal artery", LabelKind::vessel, rounded(popliteal), kPopliteal_mm, bone));
+  found.push_back(tube("sciatic nerve", LabelKind::nerve, std::move(sciatic), 5.0, bone));
   return found;
 }
 

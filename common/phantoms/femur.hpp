@@ -42,6 +42,7 @@ struct FemurParameters {
   double medial_condyle_radius_mm = 22.0, lateral_condyle_radius_mm = 21.0;
   double condyle_width_mm = 27.4;
   double notch_width_mm = 22.0;
+  double cartilage_mm = 2.5;
   double cortical_g_cm3 = 1.9;
   double cancellous_g_cm3 = 0.22;
   double compressive_g_cm3 = 0.58, tensile_g_cm3 = 0.40;
@@ -68,8 +69,12 @@ class Femur final : public PhantomBone {
   [[nodiscard]] Box bounds() const override;
   [[nodiscard]] BoneDepths depths(const Vec3& at_mm) const override;
   [[nodiscard]] double cancellous_g_cm3(const Vec3& at_mm) const override;
-  [[nodiscard]] double cortical_g_cm3() const override { return p_.cortical_g_cm3; }
-  [[nodiscard]] double marrow_g_cm3() const override { return p_.marrow_g_cm3; }
+  [[nodiscard]] double cortical_g_cm3(int /*bone*/) const override { return p_.cortical_g_cm3; }
+  [[nodiscard]] double marrow_g_cm3(int /*bone*/) const override { return p_.marrow_g_cm3; }
+  [[nodiscard]] std::vector<Structure> structures() const override;
+
+  // The least `way` · p of both condyles, for a unit vector in a sagittal plane: how far they reach against it.
+  [[nodiscard]] double condyles_reach_mm(const Vec3& way) const;
 
  private:
   // All that follows is in the bone's own directions: x lateral, y anterior, z proximal. It is the same for both sides.
@@ -93,6 +98,7 @@ class Femur final : public PhantomBone {
     Vec3 posterior = Vec3::Zero(), anterior = Vec3::Zero();  // centres of the circles, with x = 0
   };
   [[nodiscard]] double condyle_mm(const Condyle& condyle, const Vec3& at) const;
+  [[nodiscard]] double joint_face_mm(const Vec3& at) const;     // negative where knee cartilage lies
   [[nodiscard]] Vec3 epicondyle(const Condyle& condyle) const;  // its tip
 
   FemurParameters p_;
@@ -105,6 +111,7 @@ class Femur final : public PhantomBone {
   double neck_length_mm_ = 0.0;
   Vec3 head_, trochanter_, trochanter_tip_, lesser_, lesser_tip_;  // centres, and the tip of the lesser one
   Condyle medial_, lateral_condyle_;
+  Vec3 trochlea_ = Vec3::Zero();  // the middle of its round groove
   Vec3 compressive_from_, compressive_to_;
   std::vector<Vec3> tensile_;  // a line through the middle of the group
 };

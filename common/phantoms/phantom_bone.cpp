@@ -4,6 +4,10 @@
 #include <span>
 
 #include "common/phantoms/femur.hpp"
+#include "common/phantoms/hip.hpp"
+#include "common/phantoms/knee.hpp"
+#include "common/phantoms/patella.hpp"
+#include "common/phantoms/pelvis.hpp"
 #include "common/phantoms/tibia.hpp"
 
 namespace osteon::phantoms {
@@ -27,21 +31,29 @@ Result<std::unique_ptr<PhantomBone>> made(Result<Parameters> parameters, Side si
 
 }  // namespace
 
-BoneTissue PhantomBone::tissue(const Vec3& at_mm) const {
-  const BoneDepths at = depths(at_mm);
+BoneTissue tissue_of(const BoneDepths& at) {
   if (at.surface_mm >= 0.0) return BoneTissue::none;
   if (at.cortex_mm >= 0.0) return BoneTissue::cortical;
   return at.marrow_mm >= 0.0 ? BoneTissue::cancellous : BoneTissue::marrow;
 }
 
+Box PhantomBone::bounds_of_all() const {
+  Box box = bounds();
+  for (const Structure& structure : structures()) {
+    box.include(structure.bounds.min_mm);
+    box.include(structure.bounds.max_mm);
+  }
+  return box;
+}
+
 double PhantomBone::density_g_cm3(const Vec3& at_mm, double blur_mm) const {
   const BoneDepths at = depths(at_mm);
   const double inner = share_beyond(at.cortex_mm, blur_mm);
-  if (inner == 0.0) return cortical_g_cm3();
+  const double cortical = cortical_g_cm3(at.bone), marrow = marrow_g_cm3(at.bone);
+  if (inner == 0.0) return cortical;
   const double canal = share_beyond(at.marrow_mm, blur_mm);
-  const double within =
-      canal == 1.0 ? marrow_g_cm3() : canal * marrow_g_cm3() + (1.0 - canal) * cancellous_g_cm3(at_mm);
-  return inner * within + (1.0 - inner) * cortical_g_cm3();
+  const double within = canal == 1.0 ? marrow : canal * marrow + (1.0 - canal) * cancellous_g_cm3(at_mm);
+  return inner * within + (1.0 - inner) * cortical;
 }
 
 Result<std::unique_ptr<PhantomBone>> make_bone(const BoneRecipe& recipe) {
@@ -49,7 +61,15 @@ Result<std::unique_ptr<PhantomBone>> make_bone(const BoneRecipe& recipe) {
   if (auto known = check_word("the preset", recipe.preset, kPresets); !known) return tl::unexpected(known.error());
   if (auto known = check_word("the condition", recipe.condition, kConditions); !known)
     return tl::unexpected(known.error());
+  if (recipe.kind == "knee") return make_knee(recipe);
+  if (recipe.kind == "patella") return made<Patella>(patella_parameters(recipe), recipe.side);
   if (recipe.kind == "tibia") return made<Tibia>(tibia_parameters(recipe), recipe.side);
+  if (recipe.kind == "hip") return make_hip(recipe);
+  if (recipe.kind == "pelvis") {
+    const auto parameters = pelvis_parameters(recipe);
+    if (!parameters) return tl::unexpected(parameters.error());
+    return std::make_unique<Pelvis>(*parameters);
+  }
   return made<Femur>(femur_parameters(recipe), recipe.side);
 }
 

@@ -1,5 +1,6 @@
 // A bone of known shape, tissue and density: a closed form of its parameters. Each kind of bone is one pair of files.
 #pragma once
+#include <functional>
 #include <map>
 #include <memory>
 #include <string>
@@ -16,7 +17,7 @@ enum class Side { left, right };
 
 // A parameter of a bone. Its name ends in the unit, such as head_diameter_mm; without a unit it is a fraction.
 struct NamedValue {
-  std::string_view name;
+  std::string name;
   double value = 0.0;
   double least = 0.0, most = 0.0;  // outside of these no such bone exists
 };
@@ -42,9 +43,22 @@ struct BoneDepths {
   int bone = 1;             // number of the nearest bone, from 1
 };
 
+[[nodiscard]] BoneTissue tissue_of(const BoneDepths& depths);
+
 struct BoneAnatomy {
   std::vector<Landmark> landmarks;
   std::vector<PlannedAxis> axes;
+  std::vector<PlannedPlane> planes = {};
+};
+
+// What lies beside bone: cartilage, where a ligament begins, a vessel or a nerve. A closed form, too.
+struct Structure {
+  std::string name;
+  LabelKind kind = LabelKind::soft_tissue;
+  double hu = 0.0;
+  Box bounds;                                            // contains it
+  std::function<double(const Vec3& at_mm)> distance_mm;  // to its surface, mm, negative inside; near it to first order
+  std::vector<Vec3> line_mm = {};                        // the middle of a vessel or nerve, from its proximal end
 };
 
 // Immutable, so any thread may read it. The frame is LPS in millimetres; each kind says where its origin lies.
@@ -57,19 +71,25 @@ class PhantomBone {
   [[nodiscard]] virtual BoneAnatomy anatomy() const = 0;
   [[nodiscard]] virtual Box bounds() const = 0;  // contains the bone
   [[nodiscard]] virtual BoneDepths depths(const Vec3& at_mm) const = 0;
-  // Density, g/cm³: that of cancellous bone at a point, and those of the other tissues.
+  // Density, g/cm³: that of cancellous bone at a point, and those of the other tissues of a bone by its number.
   [[nodiscard]] virtual double cancellous_g_cm3(const Vec3& at_mm) const = 0;
-  [[nodiscard]] virtual double cortical_g_cm3() const = 0;
-  [[nodiscard]] virtual double marrow_g_cm3() const = 0;
+  [[nodiscard]] virtual double cortical_g_cm3(int bone) const = 0;
+  [[nodiscard]] virtual double marrow_g_cm3(int bone) const = 0;
+  // They never reach into bone. The bone must outlive them.
+  [[nodiscard]] virtual std::vector<Structure> structures() const { return {}; }
 
-  [[nodiscard]] BoneTissue tissue(const Vec3& at_mm) const;
+  [[nodiscard]] BoneTissue tissue(const Vec3& at_mm) const { return tissue_of(depths(at_mm)); }
+  [[nodiscard]] Box bounds_of_all() const;  // contains the bone and its structures
   // Mean of the density over `blur_mm` of depth, as samples of that pitch have it. Outside, cortex goes on.
   [[nodiscard]] double density_g_cm3(const Vec3& at_mm, double blur_mm) const;
 };
 
-inline constexpr std::string_view kBoneKinds[] = {"femur", "tibia"};
+inline constexpr std::string_view kBoneKinds[] = {"femur", "tibia", "patella", "knee", "pelvis", "hip"};
 inline constexpr std::string_view kPresets[] = {"female", "male", "small", "large"};
 inline constexpr std::string_view kConditions[] = {"young", "adult", "osteoporotic"};
+
+// Whether a bone of this kind has both sides, so that a recipe's side says nothing.
+[[nodiscard]] constexpr bool has_both_sides(std::string_view kind) { return kind == "pelvis"; }
 
 // Error: invalid_input, naming the kind, preset, condition or parameter that is wrong, and what is allowed.
 [[nodiscard]] Result<std::unique_ptr<PhantomBone>> make_bone(const BoneRecipe& recipe);

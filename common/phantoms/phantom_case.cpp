@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <limits>
 
 #include "common/volume/narrow_band.hpp"
 
@@ -73,8 +74,10 @@ PartKind fill_part(const PhantomBone& bone, const SparseVolume& surface, double 
   return PartKind::samples;
 }
 
-// Labels: three for each bone, in the order of kTissueNames.
-std::vector<CaseLabel> labels_of(const PhantomBone& bone) {
+// Labels: three for each bone, in the order of kTissueNames, and one for each structure. Those without a voxel are left
+// out, such as marrow of a bone that has none.
+std::vector<CaseLabel> labels_of(const PhantomBone& bone, const std::vector<Structure>& structures,
+                                 const CaseScan& scan) {
   const LabelProvenance provenance{.method = "parametric phantom", .parameters = {}, .edits = {}};
   std::vector<CaseLabel> labels;
   const std::vector<std::string> names = bone.names();
@@ -84,13 +87,28 @@ std::vector<CaseLabel> labels_of(const PhantomBone& bone) {
       labels.push_back({static_cast<int>(labels.size()) + 1, names.size() > 1 ? name + ", " + tissue : tissue,
                         cortical ? LabelKind::cortical : LabelKind::cancellous, provenance});
     }
+  for (const Structure& structure : structures)
+    labels.push_back({static_cast<int>(labels.size()) + 1, structure.name, structure.kind, provenance});
+  std::array<bool, 256> there{};
+  for (const std::uint8_t value : scan.labels.values()) there[value] = true;
+  std::erase_if(labels, [&](const CaseLabel& label) { return !there[static_cast<std::size_t>(label.value)]; });
   for (const NamedValue& parameter : bone.parameters())
     labels.front().provenance.parameters[std::string(parameter.name)] = parameter.value;
   return labels;
 }
 
-Result<CaseScan> scan_of(const PhantomBone& bone, const PhantomCaseOptions& options, const CoordBox& box,
-                         const KeepGoing& keep_going) {
+// The first structure that has a point, counted from 0; -1 if none has it.
+int structure_at(const std::vector<Structure>& structures, const Vec3& at) {
+  for (std::size_t i = 0; i < structures.size(); ++i) {
+    const Box& box = structures[i].bounds;
+    if ((at.array() < box.min_mm.array()).any() || (at.array() > box.max_mm.array()).any()) continue;
+    if (structures[i].distance_mm(at) < 0.0) return static_cast<int>(i);
+  }
+  return -1;
+}
+
+Result<CaseScan> scan_of(const PhantomBone& bone, const std::vector<Structure>& structures,
+                         const PhantomCaseOptions& options, const CoordBox& box, const KeepGoing& keep_going) {
   CaseScan scan;
   const Coord dims = box.dims();
   scan.geometry.dims = {dims.x, dims.y, dims.z};
@@ -103,27 +121,35 @@ Result<CaseScan> scan_of(const PhantomBone& bone, const PhantomCaseOptions& opti
         std::lround(std::max(options.hu.first, (density_g_cm3 - line.intercept_g_cm3) / line.slope_g_cm3_per_hu)));
   };
   const auto soft = static_cast<std::int16_t>(std::lround(options.hu.second));
+  const int first_structure = static_cast<int>(kTissueNames.size() * bone.names().size()) + 1;
   for (int z = box.min.z; z <= box.max.z; ++z) {
     if (!keep_going(static_cast<double>(z - box.min.z) / dims.z)) return stopped_while("labelling the phantom");
-    for (int y = box.min.y; y <= box.max.y; ++y)
+    for (int y = box.min.y; y <= box.max.y; ++y) {
+      double free_until_mm = -std::numeric_limits<double>::infinity();  // no bone in this row before there
       for (int x = box.min.x; x <= box.max.x; ++x) {
         const Vec3 at = position_mm({x, y, z}, options.pitch_mm);
-        const BoneTissue tissue = bone.tissue(at);
+        const bool is_free = at.x() < free_until_mm;
+        const BoneDepths depths = is_free ? BoneDepths{} : bone.depths(at);
+        const BoneTissue tissue = is_free ? BoneTissue::none : tissue_of(depths);
         if (tissue == BoneTissue::none) {
-          scan.hu.push_back(soft);
-          scan.labels.push_back(0);
+          if (!is_free) free_until_mm = at.x() + depths.surface_mm / kSteepest;
+          const int found = structure_at(structures, at);
+          scan.hu.push_back(found < 0 ? soft : static_cast<std::int16_t>(std::lround(structures[to_index(found)].hu)));
+          scan.labels.push_back(static_cast<std::uint8_t>(found < 0 ? 0 : first_structure + found));
           scan.tissue.push_back(0);
           continue;
         }
         const bool cortical = tissue == BoneTissue::cortical;
-        const double density = cortical                           ? bone.cortical_g_cm3()
+        const int number = depths.bone;
+        const double density = cortical                           ? bone.cortical_g_cm3(number)
                                : tissue == BoneTissue::cancellous ? bone.cancellous_g_cm3(at)
-                                                                  : bone.marrow_g_cm3();
-        const int first = static_cast<int>(kTissueNames.size()) * (bone.depths(at).bone - 1);
+                                                                  : bone.marrow_g_cm3(number);
+        const int first = static_cast<int>(kTissueNames.size()) * (number - 1);
         scan.hu.push_back(hu_of(density));
         scan.labels.push_back(static_cast<std::uint8_t>(first + static_cast<int>(tissue)));
         scan.tissue.push_back(static_cast<std::uint8_t>(cortical ? Tissue::cortical : Tissue::trabecular));
       }
+    }
   }
   return scan;
 }
@@ -133,9 +159,10 @@ Result<CaseScan> scan_of(const PhantomBone& bone, const PhantomCaseOptions& opti
 Result<PhantomCase> build_phantom_case(const PhantomBone& bone, const PhantomCaseOptions& options,
                                        const KeepGoing& keep_going) {
   const double pitch_mm = options.pitch_mm;
-  const CoordBox box = covering_samples(bone.bounds().grown(kBand * pitch_mm), pitch_mm);
+  const std::vector<Structure> structures = bone.structures();
+  const CoordBox box = covering_samples(bone.bounds_of_all().grown(kBand * pitch_mm), pitch_mm);
   if (auto fits = check_pitch(box, pitch_mm); !fits) return tl::unexpected(fits.error());
-  auto scan = scan_of(bone, options, box, part(keep_going, 0.0, kScanEnd));
+  auto scan = scan_of(bone, structures, options, box, part(keep_going, 0.0, kScanEnd));
   if (!scan) return tl::unexpected(scan.error());
   const auto described = describe_scan(*scan);
   if (!described) return tl::unexpected(described.error());
@@ -149,13 +176,14 @@ Result<PhantomCase> build_phantom_case(const PhantomBone& bone, const PhantomCas
   info.source = "parametric phantom";
   for (const std::string& name : bone.names()) info.source += ", " + name;
   info.scan = *described;
-  info.labels = labels_of(bone);
+  info.labels = labels_of(bone, structures, *scan);
   info.tissues = {
       {static_cast<int>(Tissue::cortical), "cortical", LabelKind::cortical, {.method = "parametric phantom"}},
       {static_cast<int>(Tissue::trabecular), "cancellous", LabelKind::cancellous, {.method = "parametric phantom"}}};
   BoneAnatomy anatomy = bone.anatomy();
   info.landmarks = std::move(anatomy.landmarks);
   info.axes = std::move(anatomy.axes);
+  info.planes = std::move(anatomy.planes);
   auto built = Case::build(
       std::move(info), box,
       [&](const CoordBox& samples_box, PartSamples& samples) {

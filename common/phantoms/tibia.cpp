@@ -4,6 +4,8 @@
 #include <cstdio>
 #include <numbers>
 
+#include "common/phantoms/structures.hpp"
+
 namespace osteon::phantoms {
 namespace {
 
@@ -48,6 +50,7 @@ constexpr TibiaField kTibiaFields[] = {
     {"fibula_head_mm", &T::fibula_head_mm, 16.0, 34.0},
     {"fibula_cortex_mm", &T::fibula_cortex_mm, 1.0, 5.0},
     {"gap_mm", &T::gap_mm, 1.5, 8.0},
+    {"cartilage_mm", &T::cartilage_mm, 0.5, 6.0},
     {"cortical_g_cm3", &T::cortical_g_cm3, 1.5, 2.1},
     {"cancellous_g_cm3", &T::cancellous_g_cm3, 0.05, 0.8},
     {"marrow_g_cm3", &T::marrow_g_cm3, 0.02, 0.2},
@@ -247,6 +250,70 @@ BoneAnatomy Tibia::anatomy() const {
   landmark("fibular head", fibula_head_ + 0.5 * p_.fibula_head_mm * Vec3::UnitZ());
   axis("mechanical axis", ankle, Vec3::UnitZ());
   axis("plateau slope", Vec3::Zero(), Vec3(0.0, -std::cos(slope), -std::sin(slope)));
+  return found;
+}
+
+Vec3 Tibia::between_bones(double z) const {
+  const Vec3 middle(0.0, 0.0, z), fibula = fibula_centre(z), apart = fibula - middle;
+  const Vec3 way = Vec3(apart.x(), apart.y(), 0.0).normalized();
+  const double tibia = surface_from(middle, way, [this](const Vec3& at) { return tibia_mm(at); }).dot(way);
+  return middle + 0.5 * (tibia + apart.norm() - fibula_radius_(z)) * way;
+}
+
+double Tibia::joint_face_mm(const Vec3& at) const {
+  // An ellipse on each side of the eminences, as parts of the plateau, and nothing below it.
+  constexpr double kAside = 0.29, kHalfWidth = 0.155, kHalfDepth = 0.38, kBelow_mm = 1.0;
+  const double slope = p_.slope_degrees * kDegree;
+  const double beside = ellipse_mm(std::abs(at.x()) - kAside * p_.plateau_width_mm, at.y(),
+                                   kHalfWidth * p_.plateau_width_mm, kHalfDepth * p_.plateau_depth_mm);
+  return std::max(beside, -kBelow_mm - std::cos(slope) * at.z() + std::sin(slope) * at.y());
+}
+
+std::vector<Structure> Tibia::structures() const {
+  const Distance own_bone = [this](const Vec3& at) { return std::min(tibia_mm(at), fibula_mm(at)); };
+  const Distance bone = [own_bone, this](const Vec3& at_mm) { return own_bone(own(at_mm)); };
+  const double w = p_.plateau_width_mm, d = p_.plateau_depth_mm, l = p_.length_mm, head = p_.fibula_head_mm;
+  std::vector<Structure> found;
+  Box plateau;
+  plateau.include(world({-0.5 * w, -0.5 * d, -0.15 * d}));
+  plateau.include(world({0.5 * w, 0.5 * d, 0.15 * d}));
+  found.push_back(cartilage("tibial cartilage", p_.cartilage_mm, plateau.grown(p_.cartilage_mm), bone,
+                            [this](const Vec3& at) { return joint_face_mm(own(at)); }));
+  const auto from_below = [&](double x, double y) {
+    return world(surface_from({x * w, y * d, -0.15 * d}, Vec3::UnitZ(), own_bone));
+  };
+  const Vec3 tuberosity(0.0, tuberosity_.y() + kTuberositySize * w, tuberosity_.z());
+  found.push_back(footprint("anterior cruciate ligament, tibia", from_below(-0.02, 0.2), 6.0, bone));
+  found.push_back(footprint("posterior cruciate ligament, tibia", from_below(0.0, -0.4), 6.0, bone));
+  found.push_back(footprint("patellar ligament, tibia", world(tuberosity), 8.0, bone));
+  found.push_back(
+      footprint("lateral collateral ligament, fibula", world(fibula_head_ + 0.5 * head * Vec3::UnitX()), 4.0, bone));
+
+  const auto line = [&](const std::vector<Beside>& points, double hollow_mm) {
+    std::vector<Vec3> made = line_beside(points, hollow_mm, own_bone);
+    for (Vec3& at : made) at = world(at);
+    return made;
+  };
+  // The popliteal artery lies behind the plateau. The anterior tibial one passes between the bones.
+  std::vector<Vec3> popliteal = line({{{0.0, 0.0, 8.0}, -Vec3::UnitY(), 9.0},
+                                      {{0.02 * w, 0.0, -0.05 * l}, -Vec3::UnitY(), 8.0},
+                                      {{0.04 * w, 0.0, -0.14 * l}, -Vec3::UnitY(), 8.0}},
+                                     30.0);
+  std::vector<Vec3> anterior;
+  for (const auto& [part, forward_mm] :
+       {std::pair{0.17, -12.0}, {0.185, -4.0}, {0.2, 3.0}, {0.23, 5.0}, {0.3, 4.0}, {0.4, 4.0}, {0.48, 4.0}})
+    anterior.push_back(world(between_bones(-part * l) + forward_mm * Vec3::UnitY()));
+  popliteal.push_back(anterior.front());
+  // The common peroneal nerve winds around the fibula's neck, from behind its head to the front.
+  const auto beside_neck = [&](double heads_down, const Vec3& way, double clear_mm) {
+    return Beside{fibula_centre(fibula_head_.z() - heads_down * head), way, clear_mm};
+  };
+  std::vector<Vec3> peroneal = line({beside_neck(0.0, {0.1, -1.0, 0.0}, 7.0), beside_neck(0.5, {0.6, -0.8, 0.0}, 5.0),
+                                     beside_neck(0.9, {1.0, -0.1, 0.0}, 4.0), beside_neck(1.3, {0.85, 0.5, 0.0}, 4.0)},
+                                    8.0);
+  found.push_back(tube("popliteal artery", LabelKind::vessel, rounded(popliteal), kPopliteal_mm, bone));
+  found.push_back(tube("anterior tibial artery", LabelKind::vessel, rounded(anterior), 2.0, bone));
+  found.push_back(tube("common peroneal nerve", LabelKind::nerve, std::move(peroneal), 2.5, bone));
   return found;
 }
 

@@ -30,6 +30,7 @@ struct TibiaParameters {
   double fibula_length_mm = 362.0;
   double fibula_width_mm = 13.0, fibula_head_mm = 25.0, fibula_cortex_mm = 2.8;
   double gap_mm = 2.5;
+  double cartilage_mm = 2.5;
   double cortical_g_cm3 = 1.9;
   double cancellous_g_cm3 = 0.23;
   double marrow_g_cm3 = 0.08;
@@ -53,8 +54,9 @@ class Tibia final : public PhantomBone {
   [[nodiscard]] Box bounds() const override;
   [[nodiscard]] BoneDepths depths(const Vec3& at_mm) const override;
   [[nodiscard]] double cancellous_g_cm3(const Vec3& at_mm) const override;
-  [[nodiscard]] double cortical_g_cm3() const override { return p_.cortical_g_cm3; }
-  [[nodiscard]] double marrow_g_cm3() const override { return p_.marrow_g_cm3; }
+  [[nodiscard]] double cortical_g_cm3(int /*bone*/) const override { return p_.cortical_g_cm3; }
+  [[nodiscard]] double marrow_g_cm3(int /*bone*/) const override { return p_.marrow_g_cm3; }
+  [[nodiscard]] std::vector<Structure> structures() const override;
 
  private:
   // In the bone's own directions, as in a femur: x lateral, y anterior, z proximal.
@@ -65,6 +67,8 @@ class Tibia final : public PhantomBone {
   [[nodiscard]] double tibia_mm(const Vec3& at) const;
   [[nodiscard]] double fibula_mm(const Vec3& at) const;
   [[nodiscard]] Vec3 fibula_centre(double z) const;
+  [[nodiscard]] Vec3 between_bones(double z) const;          // half way from one bone to the other
+  [[nodiscard]] double joint_face_mm(const Vec3& at) const;  // negative where cartilage lies
 
   TibiaParameters p_;
   double side_;  // of lateral along x: 1 for left, -1 for right

@@ -1,5 +1,6 @@
 #include "server/import/phantom_export.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <numbers>
@@ -21,19 +22,32 @@ nlohmann::ordered_json numbers_of(const Vec3& v) { return {v.x(), v.y(), v.z()};
 
 BlurredHu blurred_hu(const phantoms::PhantomBone& bone, double blur_mm) {
   const auto hu = [](double density_g_cm3) { return imaging::hounsfield(imaging::kRho1995, density_g_cm3); };
-  return [&bone, blur_mm, hu, cortical = hu(bone.cortical_g_cm3()), marrow = hu(bone.marrow_g_cm3())](const Vec3& at) {
+  const auto around = [structures = bone.structures(), blur_mm](const Vec3& at) {
+    double found = kAroundBone_hu;
+    for (const phantoms::Structure& structure : structures) {
+      const Box box = structure.bounds.grown(kBlurReach * blur_mm);
+      if ((at.array() < box.min_mm.array()).any() || (at.array() > box.max_mm.array()).any()) continue;
+      found += (structure.hu - kAroundBone_hu) * blurred_step(-structure.distance_mm(at), blur_mm);
+    }
+    return found;
+  };
+  return [&bone, blur_mm, hu, around](const Vec3& at) {
     const phantoms::BoneDepths depths = bone.depths(at);
-    if (depths.surface_mm > kBlurReach * blur_mm) return kAroundBone_hu;
-    double found = kAroundBone_hu + (cortical - kAroundBone_hu) * blurred_step(-depths.surface_mm, blur_mm);
+    const double beside = around(at);
+    if (depths.surface_mm > kBlurReach * blur_mm) return beside;
+    const double cortical = hu(bone.cortical_g_cm3(depths.bone)), marrow = hu(bone.marrow_g_cm3(depths.bone));
+    const double in_bone = blurred_step(-depths.surface_mm, blur_mm);
+    const double found = beside + (cortical - beside) * in_bone;
     if (depths.cortex_mm > kBlurReach * blur_mm) return found;
     const double cancellous = hu(bone.cancellous_g_cm3(at));
     const double inner = cancellous + (marrow - cancellous) * blurred_step(-depths.marrow_mm, blur_mm);
-    return found + (inner - cortical) * blurred_step(-depths.cortex_mm, blur_mm);
+    // Where a bone is sawn, its surface is nearer than the inner face of cortex.
+    return found + (inner - cortical) * std::min(in_bone, blurred_step(-depths.cortex_mm, blur_mm));
   };
 }
 
 ScannerSettings scanner_around(const phantoms::PhantomBone& bone, ScannerSettings settings, double slice_mm) {
-  const Box box = bone.bounds();
+  const Box box = bone.bounds_of_all();
   const Vec3 size = box.size_mm() + Vec3::Constant(2.0 * kFieldAround_mm);
   const double tilt = std::abs(settings.tilt_degrees) * std::numbers::pi / 180.0;
   settings.centre_mm = box.centre_mm();
@@ -51,18 +65,23 @@ Result<void> write_truth(const phantoms::PhantomBone& bone, const phantoms::Bone
                          const KeepGoing& keep_going) {
   const CaseInfo& info = made.bone.info();
   nlohmann::ordered_json truth{{"kind", recipe.kind},
-                               {"side", recipe.side == phantoms::Side::left ? "left" : "right"},
+                               {"side", phantoms::has_both_sides(recipe.kind) ? "both"
+                                        : recipe.side == phantoms::Side::left ? "left"
+                                                                              : "right"},
                                {"preset", recipe.preset},
                                {"condition", recipe.condition},
                                {"parameters", nlohmann::ordered_json::object()},
                                {"landmarks", nlohmann::ordered_json::object()},
                                {"axes", nlohmann::ordered_json::object()},
+                               {"planes", nlohmann::ordered_json::object()},
                                {"labels", nlohmann::ordered_json::object()}};
   for (const phantoms::NamedValue& value : bone.parameters())
     truth["parameters"][std::string(value.name)] = value.value;
   for (const Landmark& landmark : info.landmarks) truth["landmarks"][landmark.name] = numbers_of(landmark.point_mm);
   for (const PlannedAxis& axis : info.axes)
     truth["axes"][axis.name] = {{"point_mm", numbers_of(axis.point_mm)}, {"direction", numbers_of(axis.direction)}};
+  for (const PlannedPlane& plane : info.planes)
+    truth["planes"][plane.name] = {{"point_mm", numbers_of(plane.point_mm)}, {"normal", numbers_of(plane.normal)}};
   for (const CaseLabel& label : info.labels) truth["labels"][label.name] = label.value;
   return write_new_folder(folder, [&](const std::filesystem::path& partial) -> Result<void> {
     if (auto written = write_file(partial / "truth.json", truth.dump(1) + "\n"); !written) return written;

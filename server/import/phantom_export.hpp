@@ -11,16 +11,18 @@ namespace osteon::import {
 // HU around a phantom bone, LPS: air does not reach it.
 inline constexpr double kAroundBone_hu = 40.0;
 
-// HU as a scanner's blur shows them. Each face of cortex is an edge that depends on its distance alone, so faces must
-// be much less curved than the blur is wide. The texture of cancellous bone is not blurred. `bone` must outlive it.
+// HU as a scanner's blur shows them, with the bone's structures. Each face is an edge that depends on its distance
+// alone, so faces must be much less curved than the blur is wide. The texture of cancellous bone is not blurred. `bone`
+// must outlive it.
 [[nodiscard]] BlurredHu blurred_hu(const phantoms::PhantomBone& bone, double blur_mm);
 
-// Settings with slices that cover the bone, `slice_mm` apart and thick.
+// Settings with slices that cover the bone and its structures, `slice_mm` apart and thick.
 [[nodiscard]] ScannerSettings scanner_around(const phantoms::PhantomBone& bone, ScannerSettings settings,
                                              double slice_mm);
 
-// Makes the folder with truth.json (kind, side, parameters, landmarks, axes; see deploy/docs/phantoms.md) and
-// labels.nii.gz (0 outside, then the labels of the case). Errors: exists, internal (disk), cancelled.
+// Makes the folder with truth.json (kind, side, parameters, landmarks, axes, planes; see
+// deploy/docs/phantoms.md) and labels.nii.gz (0 outside, then the labels of the case). Errors: exists, internal (disk),
+// cancelled.
 [[nodiscard]] Result<void> write_truth(const phantoms::PhantomBone& bone, const phantoms::BoneRecipe& recipe,
                                        const phantoms::PhantomCase& made, const std::filesystem::path& folder,
                                        const KeepGoing& keep_going);

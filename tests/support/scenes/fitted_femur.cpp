@@ -17,7 +17,8 @@ std::vector<ParameterField<FemurParameters>> shape_fields() {
   std::vector<ParameterField<FemurParameters>> fields;
   for (const auto& field : femur_fields()) {
     const bool inner = field.name.starts_with("cortex") || field.name.starts_with("marrow") ||
-                       field.name == "shell_mm" || field.name == "texture" || field.name.ends_with("_cm3");
+                       field.name == "shell_mm" || field.name == "cartilage_mm" || field.name == "texture" ||
+                       field.name.ends_with("_cm3");
     if (!inner) fields.push_back(field);
   }
   return fields;

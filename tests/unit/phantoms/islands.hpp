@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "common/geometry/lattice.hpp"
+#include "common/phantoms/phantom_bone.hpp"
 
 namespace osteon::phantoms {
 
@@ -35,6 +36,27 @@ namespace osteon::phantoms {
           }
         }
       }
+  return islands;
+}
+
+// Pieces of each bone on a coarse lattice around the phantom. All are closed: no solid sample is at the lattice's end,
+// or there are none.
+[[nodiscard]] inline std::vector<int> islands_of(const PhantomBone& bone, double pitch_mm) {
+  const CoordBox box = covering_samples(bone.bounds(), pitch_mm);
+  const std::size_t bones = bone.names().size();
+  std::vector<std::vector<float>> solid(bones);
+  for (int x = box.min.x; x <= box.max.x; ++x)
+    for (int y = box.min.y; y <= box.max.y; ++y)
+      for (int z = box.min.z; z <= box.max.z; ++z) {
+        const BoneDepths at = bone.depths(position_mm({x, y, z}, pitch_mm));
+        for (std::size_t i = 0; i < bones; ++i)
+          solid[i].push_back(to_index(at.bone) == i + 1 ? static_cast<float>(at.surface_mm) : 1.0f);
+        const bool at_end =
+            x == box.min.x || y == box.min.y || z == box.min.z || x == box.max.x || y == box.max.y || z == box.max.z;
+        if (at_end && at.surface_mm < 0.0) return {};
+      }
+  std::vector<int> islands;
+  for (const std::vector<float>& one : solid) islands.push_back(count_islands(box.dims(), one));
   return islands;
 }
 

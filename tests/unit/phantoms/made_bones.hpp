@@ -2,11 +2,14 @@
 #pragma once
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
 #include <memory>
 #include <string>
 #include <utility>
 
 #include "common/phantoms/phantom_bone.hpp"
+#include "tests/support/scenes/random.hpp"
 
 namespace osteon::phantoms {
 
@@ -21,6 +24,24 @@ inline Vec3 landmark(const PhantomBone& bone, const std::string& name) {
     if (found.name == name) return found.point_mm;
   ADD_FAILURE() << "no landmark " << name;
   return Vec3::Zero();
+}
+
+// A bone of random words and parameters; those that do not fit together are drawn again. Each is up to `spread` away
+// from the preset. Cartilage keeps the thickness that follows from the others.
+inline std::unique_ptr<PhantomBone> random_bone(const std::string& kind, double spread, test::Random& random) {
+  for (int tries = 0; tries < 2000; ++tries) {
+    BoneRecipe recipe{.kind = kind, .side = random.index(2) == 0 ? Side::left : Side::right};
+    recipe.preset = kPresets[random.index(std::size(kPresets))];
+    recipe.condition = kConditions[random.index(std::size(kConditions))];
+    for (const NamedValue& value : bone_of(recipe)->parameters()) {
+      if (value.name.ends_with("cartilage_mm")) continue;
+      const double most = spread * std::max(std::abs(value.value), 0.2 * value.most);
+      recipe.changes[value.name] = std::clamp(value.value + random.between(-most, most), value.least, value.most);
+    }
+    if (auto made = make_bone(recipe)) return std::move(*made);
+  }
+  ADD_FAILURE() << "no " << kind << " in 2000 tries";
+  return nullptr;
 }
 
 }  // namespace osteon::phantoms

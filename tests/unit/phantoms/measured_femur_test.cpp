@@ -23,6 +23,7 @@ void expect_measured(const BoneRecipe& recipe) {
   const MeasuredFemur found = measure_femur(made->bone, recipe.side);
   for (const NamedValue& parameter : (*bone)->parameters()) {
     const std::string name(parameter.name);
+    if (name == "cartilage_mm") continue;  // not in the bone; structures_test.cpp measures it
     ASSERT_TRUE(found.values.contains(name)) << name << " is not measured";
     const double measured = found.values.at(name);
     double tolerance = 0.02 * std::abs(parameter.value);

@@ -78,8 +78,8 @@ class SawnPart final : public phantoms::PhantomBone {
     return depths;
   }
   double cancellous_g_cm3(const Vec3& at_mm) const override { return whole_.cancellous_g_cm3(at_mm); }
-  double cortical_g_cm3() const override { return whole_.cortical_g_cm3(); }
-  double marrow_g_cm3() const override { return whole_.marrow_g_cm3(); }
+  double cortical_g_cm3(int bone) const override { return whole_.cortical_g_cm3(bone); }
+  double marrow_g_cm3(int bone) const override { return whole_.marrow_g_cm3(bone); }
 
  private:
   const phantoms::PhantomBone& whole_;

@@ -1,0 +1,265 @@
+#include "common/phantoms/joint.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace osteon::phantoms {
+namespace {
+
+constexpr double kBoxStep_mm = 3.0;     // of the search for what a cut leaves
+constexpr double kMeetStep_mm = 0.5;    // of the search for places where members meet
+constexpr double kSteepestJoint = 1.6;  // how fast a distance of a phantom bone may grow at most, mm per mm
+
+double outside_mm(const Box& box, const Vec3& at) {
+  return (box.min_mm - at).cwiseMax(at - box.max_mm).cwiseMax(0.0).norm();
+}
+
+double beyond_mm(const std::optional<Cut>& cut, const Vec3& at) {
+  return cut ? cut->normal.dot(at - cut->point_mm) : -std::numeric_limits<double>::infinity();
+}
+
+Box moved(const Box& box, const Pose& pose) {
+  Box found;
+  for (int corner = 0; corner < 8; ++corner)
+    found.include(pose.point({(corner & 1) != 0 ? box.max_mm.x() : box.min_mm.x(),
+                              (corner & 2) != 0 ? box.max_mm.y() : box.min_mm.y(),
+                              (corner & 4) != 0 ? box.max_mm.z() : box.min_mm.z()}));
+  return found;
+}
+
+// Contains what a cut leaves of a box.
+Box kept(const Box& box, const std::optional<Cut>& cut) {
+  if (!cut) return box;
+  const auto corner = [&](int bits) {
+    return Vec3((bits & 1) != 0 ? box.max_mm.x() : box.min_mm.x(), (bits & 2) != 0 ? box.max_mm.y() : box.min_mm.y(),
+                (bits & 4) != 0 ? box.max_mm.z() : box.min_mm.z());
+  };
+  Box found;
+  for (int bits = 0; bits < 8; ++bits) {
+    const Vec3 a = corner(bits);
+    const double beyond_a = beyond_mm(cut, a);
+    if (beyond_a <= 0.0) found.include(a);
+    for (const int axis : {1, 2, 4}) {
+      const Vec3 b = corner(bits ^ axis);
+      const double beyond_b = beyond_mm(cut, b);
+      if (beyond_a <= 0.0 && beyond_b > 0.0) found.include(a + beyond_a / (beyond_a - beyond_b) * (b - a));
+    }
+  }
+  return found;
+}
+
+// The cells of a coarse lattice that the rest of a sawn bone may reach.
+Box box_of(const JointMember& member) {
+  const Box whole = kept(member.bone->bounds(), member.cut);
+  if (!member.cut) return whole;
+  const double reach = 0.5 * std::sqrt(3.0) * kBoxStep_mm;
+  Box box;
+  for (double x = whole.min_mm.x(); x <= whole.max_mm.x(); x += kBoxStep_mm)
+    for (double y = whole.min_mm.y(); y <= whole.max_mm.y(); y += kBoxStep_mm)
+      for (double z = whole.min_mm.z(); z <= whole.max_mm.z(); z += kBoxStep_mm) {
+        const Vec3 middle = Vec3(x, y, z).array() + 0.5 * kBoxStep_mm;
+        if (member.bone->depths(middle).surface_mm > kSteepestJoint * reach) continue;
+        box.include({x, y, z});
+        box.include(Vec3(x, y, z).array() + kBoxStep_mm);
+      }
+  return box;
+}
+
+// Puts the member's name before each name that occurs in several members.
+template <class Named>
+std::vector<Named> told_apart(std::vector<std::pair<std::string, Named>> all) {
+  std::map<std::string, int> count;
+  for (const auto& [member, named] : all) ++count[named.name];
+  std::vector<Named> found;
+  for (auto& [member, named] : all) {
+    if (count[named.name] > 1) named.name = member + ", " + named.name;
+    found.push_back(std::move(named));
+  }
+  return found;
+}
+
+}  // namespace
+
+Joint::Joint(std::vector<JointMember> members, std::vector<NamedValue> parameters)
+    : parameters_(std::move(parameters)) {
+  int bones = 0;
+  for (JointMember& member : members) {
+    const Pose back = member.pose.inverse();
+    const Box box = box_of(member);
+    const int count = static_cast<int>(member.bone->names().size());
+    members_.push_back({std::move(member), back, box, bones});
+    bones += count;
+  }
+}
+
+Joint::Found Joint::find(const Vec3& at_mm) const {
+  Found found;
+  found.depths.surface_mm = std::numeric_limits<double>::infinity();
+  for (const Placed& placed : members_) {
+    const Vec3 at = placed.back.point(at_mm);
+    if (found.member != nullptr && outside_mm(placed.box, at) >= found.depths.surface_mm) continue;
+    BoneDepths depths = placed.member.bone->depths(at);
+    depths.surface_mm = std::max(depths.surface_mm, beyond_mm(placed.member.cut, at));
+    if (found.member != nullptr && depths.surface_mm >= found.depths.surface_mm) continue;
+    depths.bone += placed.first_bone;
+    found = {&placed, at, depths};
+  }
+  return found;
+}
+
+double Joint::surface_mm(const Placed& placed, const Vec3& at_mm) const {
+  const Vec3 at = placed.back.point(at_mm);
+  return std::max(placed.member.bone->depths(at).surface_mm, beyond_mm(placed.member.cut, at));
+}
+
+const Joint::Placed& Joint::member_of(int bone) const {
+  std::size_t i = members_.size() - 1;
+  while (i > 0 && members_[i].first_bone >= bone) --i;
+  return members_[i];
+}
+
+double Joint::cancellous_g_cm3(const Vec3& at_mm) const {
+  const Found found = find(at_mm);
+  return found.member->member.bone->cancellous_g_cm3(found.at_mm);
+}
+
+double Joint::cortical_g_cm3(int bone) const {
+  const Placed& placed = member_of(bone);
+  return placed.member.bone->cortical_g_cm3(bone - placed.first_bone);
+}
+
+double Joint::marrow_g_cm3(int bone) const {
+  const Placed& placed = member_of(bone);
+  return placed.member.bone->marrow_g_cm3(bone - placed.first_bone);
+}
+
+std::vector<std::string> Joint::names() const {
+  std::vector<std::string> names;
+  for (const Placed& placed : members_) {
+    std::vector<std::string> own = placed.member.bone->names();
+    if (own.size() == 1) own.front() = placed.member.name;
+    names.insert(names.end(), own.begin(), own.end());
+  }
+  return names;
+}
+
+std::vector<NamedValue> Joint::parameters() const {
+  std::vector<NamedValue> values = parameters_;
+  for (const Placed& placed : members_)
+    for (NamedValue& value : placed.member.bone->parameters()) {
+      value.name = placed.member.name + "." + value.name;
+      values.push_back(std::move(value));
+    }
+  return values;
+}
+
+BoneAnatomy Joint::anatomy() const {
+  std::vector<std::pair<std::string, Landmark>> landmarks;
+  std::vector<std::pair<std::string, PlannedAxis>> axes;
+  std::vector<std::pair<std::string, PlannedPlane>> planes;
+  for (const Placed& placed : members_) {
+    const auto& [name, bone, pose, cut] = placed.member;
+    BoneAnatomy own = bone->anatomy();
+    for (Landmark& landmark : own.landmarks)
+      if (beyond_mm(cut, landmark.point_mm) <= 0.0)
+        landmarks.emplace_back(name, Landmark{landmark.name, pose.point(landmark.point_mm)});
+    for (PlannedAxis& axis : own.axes) {
+      if (const double beyond = beyond_mm(cut, axis.point_mm); beyond > 0.0) {
+        const double along = cut->normal.dot(axis.direction);
+        if (std::abs(along) < 1e-6) continue;
+        axis.point_mm -= beyond / along * axis.direction;
+        if (outside_mm(placed.box, axis.point_mm) > 0.0) continue;
+      }
+      axes.emplace_back(name, PlannedAxis{axis.name, pose.point(axis.point_mm), pose.direction(axis.direction)});
+    }
+    for (const PlannedPlane& plane : own.planes)
+      planes.emplace_back(name, PlannedPlane{plane.name, pose.point(plane.point_mm), pose.direction(plane.normal)});
+  }
+  return {told_apart(std::move(landmarks)), told_apart(std::move(axes)), told_apart(std::move(planes))};
+}
+
+std::vector<Structure> Joint::structures() const {
+  std::vector<std::pair<std::string, Structure>> found;
+  for (const Placed& placed : members_)
+    for (Structure& own : placed.member.bone->structures()) {
+      if (std::ranges::find(structures_, own.name, &Structure::name) != structures_.end()) continue;
+      const Box left = kept(own.bounds, placed.member.cut);
+      if (left.empty()) continue;
+      own.bounds = moved(left, placed.member.pose);
+      for (Vec3& at : own.line_mm) at = placed.member.pose.point(at);
+      own.distance_mm = [this, distance = std::move(own.distance_mm), &placed](const Vec3& at_mm) {
+        const Vec3 at = placed.back.point(at_mm);
+        const double own_mm = std::max(distance(at), beyond_mm(placed.member.cut, at));
+        // The other bones take what they need.
+        return own_mm < 0.0 ? std::max(own_mm, -depths(at_mm).surface_mm) : own_mm;
+      };
+      found.emplace_back(placed.member.name, std::move(own));
+    }
+  std::vector<Structure> all = told_apart(std::move(found));
+  all.insert(all.end(), structures_.begin(), structures_.end());
+  return all;
+}
+
+Box Joint::bounds() const {
+  Box box;
+  for (const Placed& placed : members_) {
+    const Box own = moved(placed.box, placed.member.pose);
+    box.include(own.min_mm);
+    box.include(own.max_mm);
+  }
+  return box;
+}
+
+// Two bones are nearer than a gap where both are within half of it. A cell in which they may be is divided, down to
+// small ones.
+bool Joint::meet(const Placed& a, const Placed& b, double gap_mm) const {
+  const Box box_a = moved(a.box, a.member.pose).grown(gap_mm), box_b = moved(b.box, b.member.pose).grown(gap_mm);
+  std::vector<Box> open{{box_a.min_mm.cwiseMax(box_b.min_mm), box_a.max_mm.cwiseMin(box_b.max_mm)}};
+  if (open.front().empty()) return false;
+  while (!open.empty()) {
+    const Box cell = open.back();
+    open.pop_back();
+    const Vec3 size = cell.size_mm(), middle = cell.centre_mm();
+    const double farther = std::max(surface_mm(a, middle), surface_mm(b, middle));
+    if (farther < 0.5 * gap_mm) return true;
+    int longest = 0;
+    const double edge = size.maxCoeff(&longest);
+    if (edge < kMeetStep_mm || farther - 0.5 * kSteepestJoint * size.norm() >= 0.5 * gap_mm) continue;
+    Box low = cell, high = cell;
+    low.max_mm[longest] = high.min_mm[longest] = middle[longest];
+    open.push_back(low);
+    open.push_back(high);
+  }
+  return false;
+}
+
+std::optional<std::pair<std::string, std::string>> Joint::nearer_than(double gap_mm) const {
+  for (std::size_t i = 0; i < members_.size(); ++i)
+    for (std::size_t j = i + 1; j < members_.size(); ++j)
+      if (meet(members_[i], members_[j], gap_mm)) return std::pair(members_[i].member.name, members_[j].member.name);
+  return std::nullopt;
+}
+
+Result<JointChanges> joint_changes(const std::map<std::string, double>& changes,
+                                   std::span<const std::string_view> members) {
+  JointChanges found;
+  for (const std::string_view member : members) found.members[std::string(member)];
+  for (const auto& [name, value] : changes) {
+    const std::size_t dot = name.find('.');
+    if (dot == std::string::npos) {
+      found.own[name] = value;
+      continue;
+    }
+    const auto member = found.members.find(name.substr(0, dot));
+    if (member == found.members.end()) {
+      std::string all;
+      for (const std::string_view known : members) all += (all.empty() ? "" : ", ") + std::string(known) + ".";
+      return bad_input("\"" + name + "\" is no parameter of a bone of this joint; begin with one of " + all);
+    }
+    member->second[name.substr(dot + 1)] = value;
+  }
+  return found;
+}
+
+}  // namespace osteon::phantoms
