@@ -76,12 +76,14 @@ def on_patella(marks):
 
 
 def on_pelvis(marks):
-    """Outside on both wings of the ilium, midway between the iliac spines."""
-    wings = {side: 0.5 * (marks[f"{side} anterior superior iliac spine"]
-                          + marks[f"{side} posterior superior iliac spine"]) for side in ("left", "right")}
-    outwards = wings["left"] - wings["right"]
-    return [across(wings["left"], outwards), across(wings["right"], -outwards),
-            across(above(wings["left"], APART_MM), outwards)]
+    """Outside on both wings of the ilium, midway between the iliac spines. The instructor works further in front."""
+    def wing(side, forward):
+        front, back = (marks[f"{side} {place} superior iliac spine"] for place in ("anterior", "posterior"))
+        return forward * front + (1.0 - forward) * back
+
+    outwards = wing("left", 0.5) - wing("right", 0.5)
+    return [across(wing("left", 0.5), outwards), across(wing("right", 0.5), -outwards),
+            across(wing("left", 0.7), outwards)]
 
 
 def on_hip(marks):
@@ -95,8 +97,10 @@ def on_hip(marks):
 
 def on_knee(marks):
     """Laterally on the femur above its epicondyle, medially on the tibia, and laterally on the femur further up."""
-    lateral = marks["lateral epicondyle"] - marks["medial epicondyle"]
-    femur, tibia = marks["lateral epicondyle"], marks["tibia, knee centre"]
+    epicondyle, tibia = marks["lateral epicondyle"], marks["tibia, knee centre"]
+    lateral = epicondyle - marks["medial epicondyle"]
+    # The shaft lies in front of the epicondyles, a quarter of the way to the patella.
+    femur = epicondyle + [0.0, 0.25 * (marks["patellar ridge"] - epicondyle)[1], 0.0]
     return [across(above(femur, APART_MM), lateral), across(above(tibia, -1.5 * APART_MM), -lateral),
             across(above(femur, 2.0 * APART_MM), lateral)]
 

@@ -91,7 +91,8 @@ MARKS = {
                                                                                   ("posterior", 40, 100))},
     "hip": {"greater trochanter": [140, 10, 0], "head centre": [90, 0, 0],
             "anterior superior iliac spine": [120, -40, 80], "posterior superior iliac spine": [40, 100, 80]},
-    "knee": {"lateral epicondyle": [40, 0, 0], "medial epicondyle": [-40, 0, 0], "tibia, knee centre": [0, 0, -25]},
+    "knee": {"lateral epicondyle": [40, 0, 0], "medial epicondyle": [-40, 0, 0],
+             "patellar ridge": [0, -48, 0], "tibia, knee centre": [0, 0, -25]},
 }
 
 
@@ -106,6 +107,9 @@ class EntriesOnOtherPhantoms(unittest.TestCase):
                             "knee": [[1, 0, 0], [-1, 0, 0], [1, 0, 0]]}.items():
             for entry, side in zip(self.entries(bone), sides, strict=True):
                 np.testing.assert_allclose(plans.outward(entry), np.array(side) / np.linalg.norm(side), atol=1e-9)
+
+    def test_of_a_knee_are_on_the_shaft_and_not_behind_it(self):
+        self.assertEqual(self.entries("knee")[0]["point_mm"], [40.0, -12.0, 30.0])
 
     def test_leave_room_for_two_windows(self):
         for bone in ("pelvis", "hip", "knee"):
