@@ -83,8 +83,10 @@ PelvisParameters pelvis_preset(std::string_view name) {
     scale_pelvis(p, 0.93);
     p.hip_centres_mm = 174.0;
     p.acetabulum_diameter_mm = 47.0;
-    p.anteversion_degrees = 22.0;
-    p.spines_mm = 232.0;
+    p.anteversion_degrees = 21.3;
+    p.spines_mm = 238.0;
+    p.spine_height_mm = 74.0;
+    p.tubercle_depth_mm = 18.7;
     p.crests_mm = 272.0;
     p.posterior_spines_mm = 100.0;
     p.tubercles_mm = 62.0;
