@@ -350,12 +350,18 @@ void Pelvis::place_pubis_and_ischium() {
   const auto on_ring = [&](double across, double up) {
     return Vec3(foramen_ + across * width * foramen_across_ + up * height * foramen_up_);
   };
+  // In the rim's plane, the notch of the acetabulum is where it is lowest. Behind it lies bone.
+  const Vec3 notch = (-Vec3::UnitZ() + opening_.z() * opening_).normalized();
+  const auto at_notch = [&](double down, double deep) {
+    return Vec3(centre_ + down * r * notch - deep * r * opening_);
+  };
   const Vec3 upper_tuberosity = at.tuberosity + Vec3(7.0 * u, -7.0 * u, 24.0 * u);
   pubis_ = {
       {at.crest, 7.0 * u, at.ramus, 7.5 * u, blend},  // superior ramus
       {at.ramus, 7.5 * u, {centre_.x() - 0.75 * r, 0.65 * r, -2.0 * u}, 11.0 * u, blend},
       {at.ischium, 14.0 * u, upper_tuberosity, 11.5 * u, blend},
       {centre_ + Vec3(-0.5 * r, -0.1 * r, -0.75 * r), 10.0 * u, upper_tuberosity, 9.0 * u, blend},
+      {at_notch(0.7, 0.85), 7.5 * u, at_notch(1.2, 0.40), 7.5 * u, blend},
       {on_ring(1.0, 0.0), 5.0 * u, upper_tuberosity, 8.0 * u, blend},
       {on_ring(0.7, -0.7), 5.0 * u, at.tuberosity, 5.0 * u, blend},
       {at.pubis_corner, 6.0 * u, on_ring(0.0, -1.0), 5.5 * u, blend},  // inferior ramus
@@ -366,10 +372,7 @@ void Pelvis::place_pubis_and_ischium() {
       {at.tubercle, tubercle, at.tubercle - Vec3(3.0 * u, 6.0 * u, 2.0 * u), tubercle, kKnobBlend * u},
   };
   pubis_top_z_ = r * (1.0 + kWall) + 2.0 * u;
-  // In the rim's plane, the notch is where it is lowest.
-  const Vec3 notch = (-Vec3::UnitZ() + opening_.z() * opening_).normalized();
-  fossa_ = {centre_ - 0.64 * r * opening_, 0.42 * r, centre_ + 1.05 * r * notch - 0.08 * r * opening_, 0.34 * r,
-            kRimBlend};
+  fossa_ = {at_notch(0.0, 0.64), 0.42 * r, at_notch(1.05, 0.0), 0.32 * r, kRimBlend};
 }
 
 // From 0 at 0 to 0 at 1, and 1 at `top`. Constant beyond.
