@@ -120,7 +120,7 @@ void expect_three_bones(const PhantomBone& bone, double pitch_mm, const std::str
       }
   // Samples may fall beside a thin edge, and finer ones do not.
   for (const std::size_t i : {0u, 2u})
-    if (pitch_mm > 2.0 && count_islands(dims, solid[i]) > 1) return expect_three_bones(bone, 0.5 * pitch_mm, which);
+    if (pitch_mm > 2.0 && count_islands(dims, solid[i]) > 1) return expect_three_bones(bone, 0.6 * pitch_mm, which);
   for (const std::size_t i : {0u, 2u}) ASSERT_EQ(count_islands(dims, solid[i]), 1) << bone.names()[i] << ", " << which;
   // Between neighbouring samples of two bones there is a place without bone.
   const std::size_t steps[] = {to_index(dims.y) * to_index(dims.z), to_index(dims.z), 1};
