@@ -593,7 +593,7 @@ BoneAnatomy Pelvis::anatomy() const {
     for (const auto& landmark : landmarks) found.landmarks.push_back({prefix + landmark.name, world(landmark.at)});
     found.axes.push_back({prefix + "acetabular opening", world(centre_), world(opening_)});
   }
-  found.planes.push_back({"anterior pelvic plane", {0.0, -p_.plane_forward_mm, 0.0}, -Vec3::UnitY()});
+  found.planes.push_back({"anterior pelvic plane", {0.0, -p_.plane_forward_mm, 0.0}, {0.0, -1.0, 0.0}});
   return found;
 }
 
