@@ -326,7 +326,7 @@ void Pelvis::place_ilium() {
       // The ends of the crest. Only one ball reaches to the tip of each spine, so the tip is where it is said to be.
       {in_wing(0.86, 0.75), 0.5 * p_.crest_mm, posterior_spine_ - 8.0 * back, 0.6 * spine, blend},
       {tail, 7.0 * u, posterior_spine_, spine, knob},
-      {in_wing(0.20, 0.92), 6.5 * u, spine_ + 5.0 * back, 7.0 * u, knob},
+      {in_wing(0.20, 0.92), 6.5 * u, spine_ + 8.5 * back, 7.2 * u, 1.5 * knob},
       {in_wing(0.12, 0.75), 5.5 * u, spine_, spine, knob},
   };
   ilium_bottom_ = -10.0 * u;
