@@ -39,6 +39,14 @@ TEST(BoneRecipeFile, KeepsWhatTheFileDoesNotName) {
   EXPECT_EQ(recipe->preset, "large");
 }
 
+TEST(BoneRecipeFile, ReadsParametersOfTheBonesOfAJoint) {
+  const auto recipe =
+      parse_bone_recipe("parameters: {joint_gap_mm: 4, femur.length_mm: 402.5}\n", "f.yaml", {.kind = "knee"});
+  ASSERT_TRUE(recipe) << recipe.error().message;
+  EXPECT_EQ(recipe->changes, (std::map<std::string, double>{{"femur.length_mm", 402.5}, {"joint_gap_mm", 4.0}}));
+  EXPECT_TRUE(phantoms::make_bone(*recipe));
+}
+
 TEST(BoneRecipeFile, FaultsNameTheFileTheFieldAndTheRemedy) {
   const auto refused = [](const char* text, const char* named) {
     const auto recipe = parse_bone_recipe(text, "f.yaml", {});
