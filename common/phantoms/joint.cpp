@@ -157,6 +157,7 @@ std::vector<NamedValue> Joint::parameters() const {
 BoneAnatomy Joint::anatomy() const {
   std::vector<std::pair<std::string, Landmark>> landmarks;
   std::vector<std::pair<std::string, PlannedAxis>> axes;
+  std::vector<std::pair<std::string, PlannedPlane>> planes;
   for (const Placed& placed : members_) {
     const auto& [name, bone, pose, cut] = placed.member;
     BoneAnatomy own = bone->anatomy();
@@ -172,8 +173,10 @@ BoneAnatomy Joint::anatomy() const {
       }
       axes.emplace_back(name, PlannedAxis{axis.name, pose.point(axis.point_mm), pose.direction(axis.direction)});
     }
+    for (const PlannedPlane& plane : own.planes)
+      planes.emplace_back(name, PlannedPlane{plane.name, pose.point(plane.point_mm), pose.direction(plane.normal)});
   }
-  return {told_apart(std::move(landmarks)), told_apart(std::move(axes))};
+  return {told_apart(std::move(landmarks)), told_apart(std::move(axes)), told_apart(std::move(planes))};
 }
 
 std::vector<Structure> Joint::structures() const {

@@ -4,8 +4,10 @@
 #include <span>
 
 #include "common/phantoms/femur.hpp"
+#include "common/phantoms/hip.hpp"
 #include "common/phantoms/knee.hpp"
 #include "common/phantoms/patella.hpp"
+#include "common/phantoms/pelvis.hpp"
 #include "common/phantoms/tibia.hpp"
 
 namespace osteon::phantoms {
@@ -62,6 +64,12 @@ Result<std::unique_ptr<PhantomBone>> make_bone(const BoneRecipe& recipe) {
   if (recipe.kind == "knee") return make_knee(recipe);
   if (recipe.kind == "patella") return made<Patella>(patella_parameters(recipe), recipe.side);
   if (recipe.kind == "tibia") return made<Tibia>(tibia_parameters(recipe), recipe.side);
+  if (recipe.kind == "hip") return make_hip(recipe);
+  if (recipe.kind == "pelvis") {
+    const auto parameters = pelvis_parameters(recipe);
+    if (!parameters) return tl::unexpected(parameters.error());
+    return std::make_unique<Pelvis>(*parameters);
+  }
   return made<Femur>(femur_parameters(recipe), recipe.side);
 }
 

@@ -49,6 +49,7 @@ struct BoneDepths {
 struct BoneAnatomy {
   std::vector<Landmark> landmarks;
   std::vector<PlannedAxis> axes;
+  std::vector<PlannedPlane> planes = {};
 };
 
 // What lies beside bone: cartilage, where a ligament begins, a vessel or a nerve. A closed form, too.
@@ -86,9 +87,12 @@ class PhantomBone {
   [[nodiscard]] double density_g_cm3(const Vec3& at_mm, double blur_mm) const;
 };
 
-inline constexpr std::string_view kBoneKinds[] = {"femur", "tibia", "patella", "knee"};
+inline constexpr std::string_view kBoneKinds[] = {"femur", "tibia", "patella", "knee", "pelvis", "hip"};
 inline constexpr std::string_view kPresets[] = {"female", "male", "small", "large"};
 inline constexpr std::string_view kConditions[] = {"young", "adult", "osteoporotic"};
+
+// Whether a bone of this kind has both sides, so that a recipe's side says nothing.
+[[nodiscard]] constexpr bool has_both_sides(std::string_view kind) { return kind == "pelvis"; }
 
 // Error: invalid_input, naming the kind, preset, condition or parameter that is wrong, and what is allowed.
 [[nodiscard]] Result<std::unique_ptr<PhantomBone>> make_bone(const BoneRecipe& recipe);

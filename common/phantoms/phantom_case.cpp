@@ -183,6 +183,7 @@ Result<PhantomCase> build_phantom_case(const PhantomBone& bone, const PhantomCas
   BoneAnatomy anatomy = bone.anatomy();
   info.landmarks = std::move(anatomy.landmarks);
   info.axes = std::move(anatomy.axes);
+  info.planes = std::move(anatomy.planes);
   auto built = Case::build(
       std::move(info), box,
       [&](const CoordBox& samples_box, PartSamples& samples) {

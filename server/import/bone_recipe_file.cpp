@@ -27,8 +27,10 @@ void take_fields(const YAML::Node& root, phantoms::BoneRecipe& recipe) {
   if (const YAML::Node node = root["preset"]) recipe.preset = word_of(node, "preset", phantoms::kPresets);
   if (const YAML::Node node = root["condition"]) recipe.condition = word_of(node, "condition", phantoms::kConditions);
   constexpr std::string_view kSides[] = {"left", "right"};
-  if (const YAML::Node node = root["side"])
-    recipe.side = word_of(node, "side", kSides) == "left" ? phantoms::Side::left : phantoms::Side::right;
+  const YAML::Node side = root["side"];
+  if (side && phantoms::has_both_sides(recipe.kind))
+    throw YamlFault{"side is for a bone of one side; leave it out for a " + recipe.kind + ", which has both sides"};
+  if (side) recipe.side = word_of(side, "side", kSides) == "left" ? phantoms::Side::left : phantoms::Side::right;
   const YAML::Node parameters = root["parameters"];
   if (!parameters) return;
   if (!parameters.IsMap()) throw YamlFault{std::string("parameters is not a map; ") + kParameterList.remedy};

@@ -1,4 +1,5 @@
 #include <CLI/CLI.hpp>
+#include <cctype>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -108,6 +109,13 @@ Result<void> write_bone(const PhantomArguments& a, const phantoms::PhantomBone& 
   return {};
 }
 
+std::string title_of(const phantoms::BoneRecipe& recipe) {
+  std::string kind = recipe.kind;
+  if (!phantoms::has_both_sides(kind)) return (recipe.side == phantoms::Side::left ? "Left " : "Right ") + kind;
+  kind.front() = static_cast<char>(std::toupper(static_cast<unsigned char>(kind.front())));
+  return kind;
+}
+
 Result<std::string> run_bone(const PhantomArguments& a, const StopSignal& stop) {
   const auto recipe = recipe_of(a);
   if (!recipe) return tl::unexpected(recipe.error());
@@ -118,9 +126,7 @@ Result<std::string> run_bone(const PhantomArguments& a, const StopSignal& stop) 
   Bar bar(stop);
   phantoms::PhantomCaseOptions options;
   options.pitch_mm = a.pitch_mm.value_or(kBonePitch_mm);
-  options.title = !a.title.empty()                       ? a.title
-                  : recipe->side == phantoms::Side::left ? "Left " + a.kind
-                                                         : "Right " + a.kind;
+  options.title = a.title.empty() ? title_of(*recipe) : a.title;
   options.calibration = imaging::kRho1995;
   options.hu = {imaging::kAir_hu, kAroundBone_hu};
   const auto made = phantoms::build_phantom_case(**bone, options, bar.stage(0.0, 0.4));
@@ -145,6 +151,8 @@ Result<std::string> run_phantom(const PhantomArguments& a, const StopSignal& sto
   for (const CLI::Option* option : a.bone_options)
     if (layered && option->count() > 0)
       return bad_input(option->get_name() + " is for a bone, such as a femur; leave it out for a " + a.kind);
+  if (!a.side.empty() && phantoms::has_both_sides(a.kind))
+    return bad_input("--side is for a bone of one side; leave it out for a " + a.kind + ", which has both sides");
   return layered ? run_layers(a, stop) : run_bone(a, stop);
 }
 
@@ -154,14 +162,15 @@ void add_bone_options(CLI::App& phantom, CLI::Option* dicom, PhantomArguments& a
     a.bone_options.push_back(phantom.add_option(name, value, help));
     return phantom.get_option(name);
   };
-  text("--side", a.side, "Of a bone: left (default) or right")->check(CLI::IsMember({"left", "right"}));
+  text("--side", a.side, "Of a bone: left (default) or right; a pelvis has both")
+      ->check(CLI::IsMember({"left", "right"}));
   text("--preset", a.preset, "Of a bone: female, male (default), small or large")
       ->check(CLI::IsMember({"female", "male", "small", "large"}));
   text("--condition", a.condition, "Of a bone: young, adult (default) or osteoporotic")
       ->check(CLI::IsMember({"young", "adult", "osteoporotic"}));
   text("--parameters", a.parameters, "YAML file with these words and with parameters of the bone");
   text("--stl", a.stl, "Also write the bone's surface to this STL file");
-  text("--truth", a.truth, "Also write parameters, landmarks, axes and labels of the bone, to this folder");
+  text("--truth", a.truth, "Also write parameters, landmarks, axes, planes and labels of the bone, to this folder");
   const auto scanner = [&](const char* name, double& value, double least, double most, const char* help) {
     a.bone_options.push_back(
         phantom.add_option(name, value, help)->check(within(least, most))->capture_default_str()->needs(dicom));
@@ -184,7 +193,8 @@ void add_phantom_command(CLI::App& app, std::vector<Command>& commands) {
   phantom
       ->add_option("KIND", a.kind,
                    "block (layers from the top down), tube (layers from the outside in), femur, tibia (with its "
-                   "fibula), patella, or knee (femur, tibia, fibula and patella)")
+                   "fibula), patella, knee (femur, tibia, fibula and patella), pelvis (both hip bones and the sacrum), "
+                   "or hip (one hip bone and the end of a femur)")
       ->required()
       ->check(CLI::IsMember(kinds));
   phantom->add_option("--layers", a.layers,

@@ -72,18 +72,23 @@ Result<void> write_truth(const phantoms::PhantomBone& bone, const phantoms::Bone
                          const KeepGoing& keep_going) {
   const CaseInfo& info = made.bone.info();
   nlohmann::ordered_json truth{{"kind", recipe.kind},
-                               {"side", recipe.side == phantoms::Side::left ? "left" : "right"},
+                               {"side", phantoms::has_both_sides(recipe.kind) ? "both"
+                                        : recipe.side == phantoms::Side::left ? "left"
+                                                                              : "right"},
                                {"preset", recipe.preset},
                                {"condition", recipe.condition},
                                {"parameters", nlohmann::ordered_json::object()},
                                {"landmarks", nlohmann::ordered_json::object()},
                                {"axes", nlohmann::ordered_json::object()},
+                               {"planes", nlohmann::ordered_json::object()},
                                {"labels", nlohmann::ordered_json::object()}};
   for (const phantoms::NamedValue& value : bone.parameters())
     truth["parameters"][std::string(value.name)] = value.value;
   for (const Landmark& landmark : info.landmarks) truth["landmarks"][landmark.name] = numbers_of(landmark.point_mm);
   for (const PlannedAxis& axis : info.axes)
     truth["axes"][axis.name] = {{"point_mm", numbers_of(axis.point_mm)}, {"direction", numbers_of(axis.direction)}};
+  for (const PlannedPlane& plane : info.planes)
+    truth["planes"][plane.name] = {{"point_mm", numbers_of(plane.point_mm)}, {"normal", numbers_of(plane.normal)}};
   for (const CaseLabel& label : info.labels) truth["labels"][label.name] = label.value;
   return write_new_folder(folder, [&](const std::filesystem::path& partial) -> Result<void> {
     if (auto written = write_file(partial / "truth.json", truth.dump(1) + "\n"); !written) return written;

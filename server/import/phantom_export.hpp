@@ -21,8 +21,9 @@ inline constexpr double kAroundBone_hu = 40.0;
 [[nodiscard]] ScannerSettings scanner_around(const phantoms::PhantomBone& bone, ScannerSettings settings,
                                              double slice_mm);
 
-// Makes the folder with truth.json (kind, side, parameters, landmarks, axes; see deploy/docs/phantoms.md) and
-// labels.nii.gz (0 outside, then the labels of the case). Errors: exists, internal (disk), cancelled.
+// Makes the folder with truth.json (kind, side, parameters, landmarks, axes, planes; see
+// deploy/docs/phantoms.md) and labels.nii.gz (0 outside, then the labels of the case). Errors: exists, internal (disk),
+// cancelled.
 [[nodiscard]] Result<void> write_truth(const phantoms::PhantomBone& bone, const phantoms::BoneRecipe& recipe,
                                        const phantoms::PhantomCase& made, const std::filesystem::path& folder,
                                        const KeepGoing& keep_going);

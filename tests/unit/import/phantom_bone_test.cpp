@@ -103,10 +103,31 @@ TEST(PhantomProgram, WritesACaseADicomSeriesAMeshAndTheTruth) {
   EXPECT_NEAR(series->volume.spacing_mm.z(), 3.0, 1e-6);
 }
 
+TEST(PhantomProgram, WritesThePlaneAndBothSidesOfAPelvis) {
+  const test::TempDir folder;
+  const auto run =
+      test::run(OSTEON_IMPORT_PROGRAM, {"phantom", "pelvis", "--pitch", "2", "--out", (folder / "case").string(),
+                                        "--truth", (folder / "truth").string()});
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  const auto bone = Case::load(folder / "case");
+  ASSERT_TRUE(bone) << bone.error().message;
+  EXPECT_EQ(bone->info().title, "Pelvis");
+  ASSERT_EQ(bone->info().planes.size(), 1u);
+  std::ifstream file(folder / "truth/truth.json");
+  const auto truth = nlohmann::json::parse(file);
+  EXPECT_EQ(truth["side"], "both");
+  const auto& plane = truth["planes"]["anterior pelvic plane"];
+  EXPECT_EQ(plane["normal"], (std::vector<double>{0.0, -1.0, 0.0}));
+  for (const char* name : {"left pubic tubercle", "right anterior superior iliac spine"})
+    EXPECT_NEAR(truth["landmarks"][name][1].get<double>(), plane["point_mm"][1].get<double>(), 1e-9) << name;
+  EXPECT_EQ(truth["labels"]["sacrum, cortical"], 7);
+}
+
 TEST(PhantomProgram, RefusesInOneSentenceAndWritesNothing) {
   const test::TempDir folder;
   const std::string out = (folder / "case").string();
   std::ofstream(folder / "bad.yaml") << "parameters: {neck_shaft_degrees: 150}\n";
+  std::ofstream(folder / "side.yaml") << "side: left\n";
   const auto refused = [&](std::vector<std::string> arguments, const std::string& named) {
     arguments.insert(arguments.begin(), "phantom");
     arguments.insert(arguments.end(), {"--out", out});
@@ -123,6 +144,9 @@ TEST(PhantomProgram, RefusesInOneSentenceAndWritesNothing) {
   for (const char* option : {"--side", "--noise"})
     refused({"block", "--layers", "5:1.9", "--dicom", out + "-ct", option, option[2] == 's' ? "left" : "10"},
             std::string(option) + " is for a bone, such as a femur; leave it out for a block");
+  refused({"pelvis", "--side", "left"}, "--side is for a bone of one side; leave it out for a pelvis");
+  refused({"pelvis", "--parameters", (folder / "side.yaml").string()},
+          "side.yaml: side is for a bone of one side; leave it out for a pelvis");
   refused({"block"}, "needs --layers");
   refused({"tube", "--layers", "5:1.9", "--side", "left"}, "--side");
   refused({"femur", "--pitch", "0.03"}, "--pitch");
