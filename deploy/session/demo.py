@@ -136,7 +136,7 @@ def run(options, programs, out):
     started = time.monotonic()
     if options.bone:
         case = phantom_case(options.bone, programs)
-        together_at = plans.on_shaft(case_info(programs, case), options.bone)
+        together_at = plans.on_phantom(case_info(programs, case), options.bone)
         alone_at = together_at[:1]
     elif options.case:
         case = prepare_case(options.case.resolve(), programs, [])

@@ -27,33 +27,78 @@ def from_two_sides(first, second):
 
 
 def is_on_shaft(entry):
-    """Whether the entry is one of on_shaft."""
+    """Whether the entry is one of on_phantom, along a shaft or upright."""
     return "point_mm" in entry
 
 
-def on_shaft(case, bone):
-    """Entries of two surgeons and of an instructor on the shaft of a femur or a tibia, across the shaft.
+def on_phantom(case, bone):
+    """Entries of two surgeons and of an instructor on a phantom bone.
 
-    `case` has landmarks and axes in mm, LPS. The first surgeon works laterally on a femur, at the apex of its bow, and
-    medially on a tibia, at a quarter of the way from the knee to the ankle. The second surgeon works in front, further
-    down. The instructor works above the first surgeon.
+    `case` has landmarks and axes in mm, LPS. deploy/docs/phantoms.md says where the surgeons work.
     """
     marks = {mark["name"]: np.array(mark["point_mm"]) for mark in case["landmarks"]}
+    if bone in ("femur", "tibia"):
+        axis = next((axis for axis in case["axes"] if axis["name"] == "anatomical axis"), None)
+        return on_shaft(marks, axis, bone)
+    return {"patella": on_patella, "pelvis": on_pelvis, "hip": on_hip, "knee": on_knee}[bone](marks)
+
+
+def across(point, direction, up=(0.0, 0.0, 1.0)):
+    """The entry of a surgeon who stands in this direction from a point, across `up`, a unit vector."""
+    direction, up = np.array(direction, dtype=float), np.array(up)
+    direction = direction - (direction @ up) * up
+    return {"point_mm": point.tolist(), "axis": (-direction / np.linalg.norm(direction)).tolist()}
+
+
+def above(point, height_mm):
+    return point + np.array([0.0, 0.0, height_mm])
+
+
+def on_shaft(marks, axis, bone):
+    """The first surgeon works laterally on a femur, at the apex of its bow, and medially on a tibia, at a quarter of
+    the way from the knee to the ankle. The second one works in front, further down, the instructor above the first."""
     if bone == "femur":
-        shaft = next(axis for axis in case["axes"] if axis["name"] == "anatomical axis")
-        centre, up = np.array(shaft["point_mm"]), np.array(shaft["direction"])
+        centre, up = np.array(axis["point_mm"]), np.array(axis["direction"])
         side = marks["lateral epicondyle"] - marks["medial epicondyle"]
     else:
         up = marks["knee centre"] - marks["ankle centre"]
         centre = marks["knee centre"] - 0.25 * up
         side = marks["medial malleolus"] - marks["lateral malleolus"]
     up = up / np.linalg.norm(up)
+    return [across(centre, side, up), across(centre - APART_MM * up, FRONT, up),
+            across(centre + APART_MM * up, side, up)]
 
-    def entry(direction, along_mm):
-        across = direction - (direction @ up) * up
-        return {"point_mm": (centre + along_mm * up).tolist(), "axis": (-across / np.linalg.norm(across)).tolist()}
 
-    return [entry(side, 0.0), entry(np.array(FRONT), -APART_MM), entry(side, APART_MM)]
+def on_patella(marks):
+    """In front, towards the base. There is no room for two."""
+    apex, base = marks["patellar apex"], marks["patellar base"]
+    return [across(0.35 * apex + 0.65 * base, FRONT)]
+
+
+def on_pelvis(marks):
+    """Outside on both wings of the ilium, midway between the iliac spines."""
+    wings = {side: 0.5 * (marks[f"{side} anterior superior iliac spine"]
+                          + marks[f"{side} posterior superior iliac spine"]) for side in ("left", "right")}
+    outwards = wings["left"] - wings["right"]
+    return [across(wings["left"], outwards), across(wings["right"], -outwards),
+            across(above(wings["left"], APART_MM), outwards)]
+
+
+def on_hip(marks):
+    """Laterally below the greater trochanter, outside on the wing of the ilium, and laterally on the shaft."""
+    trochanter = marks["greater trochanter"]
+    wing = 0.5 * (marks["anterior superior iliac spine"] + marks["posterior superior iliac spine"])
+    lateral = trochanter - marks["head centre"]
+    return [across(above(trochanter, -APART_MM), lateral), across(wing, lateral),
+            across(above(trochanter, -2.0 * APART_MM), lateral)]
+
+
+def on_knee(marks):
+    """Laterally on the femur above its epicondyle, medially on the tibia, and laterally on the femur further up."""
+    lateral = marks["lateral epicondyle"] - marks["medial epicondyle"]
+    femur, tibia = marks["lateral epicondyle"], marks["tibia, knee centre"]
+    return [across(above(femur, APART_MM), lateral), across(above(tibia, -1.5 * APART_MM), -lateral),
+            across(above(femur, 2.0 * APART_MM), lateral)]
 
 
 def burr_window(entry, size_mm):

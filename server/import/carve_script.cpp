@@ -14,7 +14,8 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::size_t kMostSteps = 100000;
-constexpr double kFarthestCut_mm = 1000.0;
+// From the origin. A scanner may place a bone some metres from its own.
+constexpr double kFarthestCut_mm = 10'000.0;
 
 // A fault of one step. It is caught where the file and the step's number are known.
 struct Wrong {
@@ -35,7 +36,7 @@ Vec3 vector_of(const YAML::Node& node, const char* field) {
 Vec3 place_of(const YAML::Node& node, const char* field) {
   Vec3 at = vector_of(node, field);
   if (at.cwiseAbs().maxCoeff() > kFarthestCut_mm)
-    throw Wrong{std::string(field) + " is more than a metre from the origin"};
+    throw Wrong{std::string(field) + " is more than 10 m from the origin"};
   return at;
 }
 

@@ -335,7 +335,10 @@ grep -q '%s' ../../twice.txt || { echo '[  FAILED  ] Twice.IsTwice'; exit 1; }
 class DemoOfAPhantom(unittest.TestCase):
     def test_wrong_bones_are_one_sentence(self):
         for wrong, sentence in (
-                (["--bone", "pelvis"], "--bone: the demo has no plan for a 'pelvis'; take femur or tibia"),
+                (["--bone", "skull"], "--bone: there is no phantom of a 'skull'; "
+                                      "take femur, tibia, patella, pelvis, hip or knee"),
+                (["--bone", "patella", "--together"], "--together: a patella has no room for two surgeons; "
+                                                      "take another bone"),
                 (["--bone", "femur", "--case", "/"], "--case and --bone both name a bone; give one of them"),
                 (["--bone"], "--bone needs a value")):
             tried = ended([ROOT / "deploy/demo", *wrong])

@@ -1,6 +1,8 @@
 #include "tests/integration/stage.hpp"
 
+#include <algorithm>
 #include <fstream>
+#include <iterator>
 #include <limits>
 #include <sstream>
 #include <stdexcept>
@@ -95,6 +97,16 @@ Process Stage::start_haptic(const std::string& name, const nlohmann::json& plan,
   return start("osteon-haptic", {"--server", address_, "--plain", "--name", person, "--plan", plan_file,
                                  "--session-log", temp_ / (name + ".csv"), "--cut-log", temp_ / (name + "-cuts.csv"),
                                  "--summary", temp_ / (name + ".json"), "--cache", temp_ / "cache"});
+}
+
+bool Stage::is_at_work(const std::string& name) const {
+  constexpr std::ptrdiff_t kTicks = 3000;
+  return wait_until(
+      [&] {
+        std::ifstream log(temp_ / (name + ".csv"));
+        return std::count(std::istreambuf_iterator<char>(log), {}, '\n') > kTicks;
+      },
+      60s);
 }
 
 nlohmann::json drill_at(double x_mm, double y_mm, const std::string& hand) {

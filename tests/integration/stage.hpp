@@ -63,6 +63,9 @@ class Stage {
   // folder. An empty `person` is an unknown one.
   [[nodiscard]] Process start_haptic(const std::string& name, const nlohmann::json& plan,
                                      const std::string& person = {}) const;
+  // Waits until the session log of start_haptic(NAME) has 3000 ticks, which are 3 s of work on a fast enough machine.
+  // False: it has not after a minute.
+  [[nodiscard]] bool is_at_work(const std::string& name) const;
 
  private:
   TempDir temp_;

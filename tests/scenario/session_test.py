@@ -57,7 +57,7 @@ class EntriesOnAShaft(unittest.TestCase):
         for bone, height_mm in (("femur", 200.0), ("tibia", 300.0)):
             along = np.array([3.0, 0.0, 40.0])
             centre = height_mm / 40.0 * along
-            entries = plans.on_shaft(leg(bone, 1), bone)
+            entries = plans.on_phantom(leg(bone, 1), bone)
             for entry, apart_mm in zip(entries, (0.0, -plans.APART_MM, plans.APART_MM), strict=True):
                 self.assertAlmostEqual(np.linalg.norm(entry["axis"]), 1.0)
                 self.assertAlmostEqual(np.dot(entry["axis"], along), 0.0)
@@ -66,21 +66,52 @@ class EntriesOnAShaft(unittest.TestCase):
     def test_are_lateral_on_a_femur_medial_on_a_tibia_and_in_front(self):
         for bone, sign in (("femur", 1.0), ("tibia", -1.0)):
             for side in (1, -1):
-                first, second, third = map(plans.outward, plans.on_shaft(leg(bone, side), bone))
+                first, second, third = map(plans.outward, plans.on_phantom(leg(bone, side), bone))
                 self.assertGreater(sign * side * first[0], 0.99)
                 np.testing.assert_allclose(second, [0.0, -1.0, 0.0], atol=1e-12)
                 np.testing.assert_allclose(third, first)
 
     def test_of_a_right_bone_are_those_of_the_left_one_mirrored(self):
         for bone in ("femur", "tibia"):
-            for left, right in zip(plans.on_shaft(leg(bone, 1), bone), plans.on_shaft(leg(bone, -1), bone)):
+            for left, right in zip(plans.on_phantom(leg(bone, 1), bone), plans.on_phantom(leg(bone, -1), bone)):
                 for key in ("point_mm", "axis"):
                     np.testing.assert_allclose(np.array(left[key]) * [-1, 1, 1], right[key], atol=1e-9)
 
     def test_windows_are_longest_along_it(self):
-        shaft = plans.on_shaft(leg("femur", 1), "femur")[0]
+        shaft = plans.on_phantom(leg("femur", 1), "femur")[0]
         for entry, size_mm in ((shaft, [12, 18]), (plans.toward([1, 0, 0]), [18, 12])):
             self.assertEqual(plans.window(entry, [18, 12], 0.5)["steps"][0]["window_mm"], size_mm)
+
+
+# Landmarks of phantoms in a simple place, mm. Lateral is +x, in front is -y.
+MARKS = {
+    "patella": {"patellar apex": [0, 0, -20], "patellar base": [0, 0, 20]},
+    "pelvis": {f"{side} {place} superior iliac spine": [sign * x, y, 80]
+               for side, sign in (("left", 1), ("right", -1)) for place, x, y in (("anterior", 120, -40),
+                                                                                  ("posterior", 40, 100))},
+    "hip": {"greater trochanter": [140, 10, 0], "head centre": [90, 0, 0],
+            "anterior superior iliac spine": [120, -40, 80], "posterior superior iliac spine": [40, 100, 80]},
+    "knee": {"lateral epicondyle": [40, 0, 0], "medial epicondyle": [-40, 0, 0], "tibia, knee centre": [0, 0, -25]},
+}
+
+
+class EntriesOnOtherPhantoms(unittest.TestCase):
+    def entries(self, bone):
+        return plans.on_phantom({"landmarks": [{"name": name, "point_mm": point}
+                                               for name, point in MARKS[bone].items()], "axes": []}, bone)
+
+    def test_lead_into_the_bone_from_where_a_surgeon_stands(self):
+        for bone, sides in {"patella": [[0, -1, 0]], "pelvis": [[1, 0, 0], [-1, 0, 0], [1, 0, 0]],
+                            "hip": [[1, 0.2, 0], [1, 0.2, 0], [1, 0.2, 0]],
+                            "knee": [[1, 0, 0], [-1, 0, 0], [1, 0, 0]]}.items():
+            for entry, side in zip(self.entries(bone), sides, strict=True):
+                np.testing.assert_allclose(plans.outward(entry), np.array(side) / np.linalg.norm(side), atol=1e-9)
+
+    def test_leave_room_for_two_windows(self):
+        for bone in ("pelvis", "hip", "knee"):
+            places = [np.array(entry["point_mm"]) for entry in self.entries(bone)]
+            for i, j in ((0, 1), (0, 2), (1, 2)):
+                self.assertGreaterEqual(np.linalg.norm(places[i] - places[j]), plans.APART_MM)
 
 
 class Overview(unittest.TestCase):

@@ -212,6 +212,13 @@ TEST_F(Scripts, PosesAreWhatTheySay) {
   EXPECT_LT((saw.path[1].direction(Vec3::UnitX()) - Vec3::UnitZ()).norm(), 1e-12);
 }
 
+// A scanner may count its table's way from far off.
+TEST_F(Scripts, ReachABoneFarFromTheOrigin) {
+  const auto steps = read_carve_script(write("steps: [{tool: drill-3.2, at: [0, 0, -1450], axis: [0, 0, 1]}]"));
+  ASSERT_TRUE(steps) << steps.error().message;
+  EXPECT_EQ(steps->front().path.front().position_mm.z(), -1450.0);
+}
+
 TEST_F(Scripts, WrongOnesAreOneSentence) {
   const auto refused = [&](const std::string& text, const std::string& named) {
     const auto steps = read_carve_script(write(text));
@@ -228,7 +235,8 @@ TEST_F(Scripts, WrongOnesAreOneSentence) {
   refused("steps: [{tool: drill-3.2, at: [0, 0, 0]}]", "axis is missing");
   refused("steps: [{tool: drill-3.2, at: [0, 0], axis: [0, 0, 1]}]", "three numbers");
   refused("steps: [{tool: drill-3.2, at: [0, 0, .nan], axis: [0, 0, 1]}]", "three numbers");
-  refused("steps: [{tool: drill-3.2, at: [0, 0, 1e9], axis: [0, 0, 1]}]", "metre");
+  refused("steps: [{tool: drill-3.2, at: [0, 0, 1e9], axis: [0, 0, 1]}]", "10 m");
+  refused("steps: [{tool: drill-3.2, at: [0, 0, -10001], axis: [0, 0, 1]}]", "10 m");
   refused("steps: [{tool: drill-3.2, at: [0, 0, 0], axis: [0, 0, 0]}]", "no length");
   refused("steps: [{tool: drill-3.2, at: [0, 0, 0], axis: [0, 0, 1], across: [0, 0, 2]}]", "along axis");
   refused("steps: [{tool: drill-3.2, from: [0, 0, 0], axis: [0, 0, 1]}]", "to is missing");

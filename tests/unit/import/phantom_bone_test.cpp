@@ -39,6 +39,14 @@ TEST(BoneRecipeFile, KeepsWhatTheFileDoesNotName) {
   EXPECT_EQ(recipe->preset, "large");
 }
 
+TEST(BoneRecipeFile, ReadsParametersOfTheBonesOfAJoint) {
+  const auto recipe =
+      parse_bone_recipe("parameters: {joint_gap_mm: 4, femur.length_mm: 402.5}\n", "f.yaml", {.kind = "knee"});
+  ASSERT_TRUE(recipe) << recipe.error().message;
+  EXPECT_EQ(recipe->changes, (std::map<std::string, double>{{"femur.length_mm", 402.5}, {"joint_gap_mm", 4.0}}));
+  EXPECT_TRUE(phantoms::make_bone(*recipe));
+}
+
 TEST(BoneRecipeFile, FaultsNameTheFileTheFieldAndTheRemedy) {
   const auto refused = [](const char* text, const char* named) {
     const auto recipe = parse_bone_recipe(text, "f.yaml", {});
@@ -225,9 +233,11 @@ TEST(PhantomBoneCt, ATibiaAndItsFibulaComeBackAsTwoBones) {
   EXPECT_GE(agreement.dice, 0.97);
 }
 
-// A point deep in the cortex of a bone.
+// A point deep in the cortex of a bone, far from the ends of a tilted scan.
 Vec3 cortex_of(const phantoms::PhantomBone& bone, int number) {
-  const CoordBox box = covering_samples(bone.bounds().grown(-12.0), 1.0);
+  CoordBox box = covering_samples(bone.bounds(), 1.0);
+  box.min.z += 45;
+  box.max.z -= 45;
   Vec3 found = Vec3::Zero();
   double deepest = 0.0;
   for (int x = box.min.x; x <= box.max.x; ++x)

@@ -1,8 +1,16 @@
 // Drills through a bone from a CT scan at the default threshold, and compares it with the same bone made directly.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "common/imaging/calibration.hpp"
 #include "server/import/ct_import.hpp"
+#include "server/import/dicom_reader.hpp"
 #include "server/import/phantom.hpp"
+#include "server/import/phantom_export.hpp"
+#include "tests/support/temp_dir.hpp"
 #include "tests/unit/haptic_client/bench.hpp"
 
 namespace osteon::haptic::test {
@@ -48,6 +56,101 @@ TEST(ScannedBlock, TheFeedRigFeelsTheLawsThrustInEachLayer) {
     std::printf("[          ] layer %d: %.2f N\n", i, sum[i] / count[i]);
   }
   EXPECT_EQ(after_n, 0.0);
+}
+
+// A part of a phantom bone: all within `half_mm` of a height. Both ends are flat, as if sawn.
+class SawnPart final : public phantoms::PhantomBone {
+ public:
+  SawnPart(const phantoms::PhantomBone& whole, double middle_mm, double half_mm)
+      : whole_(whole), middle_mm_(middle_mm), half_mm_(half_mm) {}
+  std::vector<std::string> names() const override { return whole_.names(); }
+  std::vector<phantoms::NamedValue> parameters() const override { return whole_.parameters(); }
+  phantoms::BoneAnatomy anatomy() const override { return {}; }
+  Box bounds() const override {
+    Box box = whole_.bounds();
+    box.min_mm.z() = middle_mm_ - half_mm_;
+    box.max_mm.z() = middle_mm_ + half_mm_;
+    return box;
+  }
+  phantoms::BoneDepths depths(const Vec3& at_mm) const override {
+    phantoms::BoneDepths depths = whole_.depths(at_mm);
+    depths.surface_mm = std::max(depths.surface_mm, std::abs(at_mm.z() - middle_mm_) - half_mm_);
+    return depths;
+  }
+  double cancellous_g_cm3(const Vec3& at_mm) const override { return whole_.cancellous_g_cm3(at_mm); }
+  double cortical_g_cm3(int bone) const override { return whole_.cortical_g_cm3(bone); }
+  double marrow_g_cm3(int bone) const override { return whole_.marrow_g_cm3(bone); }
+
+ private:
+  const phantoms::PhantomBone& whole_;
+  double middle_mm_, half_mm_;
+};
+
+// What a scanner shows of a part of a bone, in thick, tilted, noisy slices, by the ordinary import. The bone goes on
+// beyond the scan.
+Case through_dicom(const phantoms::PhantomBone& bone, const SawnPart& part) {
+  const osteon::test::TempDir folder;
+  import::ScannerSettings settings{.pixel_mm = 0.8, .blur_mm = 0.5, .noise_hu = 30.0, .tilt_degrees = 12.0};
+  settings = import::scanner_around(part, settings, 3.0);
+  EXPECT_TRUE(
+      import::write_simulated_scan(settings, import::blurred_hu(bone, settings.blur_mm), folder / "ct", keep_going));
+  auto scan = import::read_dicom_series(folder / "ct", keep_going);
+  EXPECT_TRUE(scan) << scan.error().message;
+  auto made = import::import_ct(std::move(*scan), {}, keep_going);
+  EXPECT_TRUE(made) << made.error().message;
+  return std::move(*made->bone);
+}
+
+// Mean thrust of a feed rig, N, at each half millimetre of the way of its tip, along +x.
+std::map<int, double> thrusts_along_x(const Case& bone, const Vec3& at_mm) {
+  PlanStep step = straight_down("drill-3.2", HandKind::rig);
+  step.entry = {.toward = {}, .point_mm = at_mm, .axis = Vec3::UnitX(), .beside_last_mm = {}};
+  step.feed_mm_per_s = 2.0;
+  std::map<int, std::pair<double, int>> sums;
+  Bench bench(bone, {step});
+  bench.run([&](const SessionTick& tick) {
+    if (tick.order.phase != SurgeonPhase::push && tick.order.phase != SurgeonPhase::feed) return;
+    auto& [sum, count] = sums[static_cast<int>(std::floor(2.0 * tick.report.pose_bone_proxy.position_mm.x()))];
+    sum -= tick.report.coupling.force_n.x();
+    ++count;
+  });
+  EXPECT_TRUE(bench.session().done());
+  std::map<int, double> means;
+  for (const auto& [place, sum] : sums) means[place] = sum.first / sum.second;
+  return means;
+}
+
+// Drilled across its shaft, a phantom femur resists as the import of its scan does: both cortices, and marrow between.
+TEST(PhantomFemur, ItsScanIsFeltAsItIs) {
+  const auto femur = phantoms::make_bone({});
+  ASSERT_TRUE(femur) << femur.error().message;
+  const phantoms::BoneAnatomy anatomy = (*femur)->anatomy();
+  const auto shaft = std::ranges::find(anatomy.axes, "anatomical axis", &PlannedAxis::name);
+  ASSERT_NE(shaft, anatomy.axes.end());
+  const SawnPart part(**femur, shaft->point_mm.z(), 15.0);
+  const auto direct =
+      phantoms::build_phantom_case(part, {.pitch_mm = 0.5, .calibration = imaging::kRho1995}, keep_going);
+  ASSERT_TRUE(direct) << direct.error().message;
+  // The middle of the canal, as far from the shaft's chord as its bow is high: the centre of the section in this plane.
+  Box section;
+  for (double x = part.bounds().min_mm.x(); x < part.bounds().max_mm.x(); x += 0.25)
+    for (double y = part.bounds().min_mm.y(); y < part.bounds().max_mm.y(); y += 0.25) {
+      const Vec3 at(x, y, shaft->point_mm.z());
+      if (part.depths(at).marrow_mm < 0.0) section.include(at);
+    }
+  const Vec3 centre = section.centre_mm();
+  const auto truth = thrusts_along_x(direct->bone, centre),
+             scanned = thrusts_along_x(through_dicom(**femur, part), centre);
+  double sum = 0.0, difference = 0.0, most = 0.0;
+  for (const auto& [place, force] : truth) {
+    const auto found = scanned.find(place);
+    const double other = found == scanned.end() ? 0.0 : found->second;
+    sum += std::abs(force);
+    difference += std::abs(force - other);
+    most = std::max(most, force);
+  }
+  std::printf("[          ] mean difference %.1f %% of the mean thrust, most %.1f N\n", 100.0 * difference / sum, most);
+  EXPECT_LE(difference, 0.1 * sum);
 }
 
 }  // namespace
