@@ -63,7 +63,7 @@ Box box_of(const JointMember& member) {
         box.include({x, y, z});
         box.include(Vec3(x, y, z).array() + kBoxStep_mm);
       }
-  return box;
+  return kept(box, member.cut);
 }
 
 // Puts the member's name before each name that occurs in several members.
@@ -199,6 +199,18 @@ std::vector<Structure> Joint::structures() const {
   std::vector<Structure> all = told_apart(std::move(found));
   all.insert(all.end(), structures_.begin(), structures_.end());
   return all;
+}
+
+std::array<bool, 2> Joint::sawn_ends() const {
+  constexpr double kAlongZ = 0.9;
+  std::array<bool, 2> sawn{};
+  for (const Placed& placed : members_) {
+    if (!placed.member.cut) continue;
+    const double z = placed.member.pose.direction(placed.member.cut->normal).z();
+    sawn[0] = sawn[0] || z < -kAlongZ;
+    sawn[1] = sawn[1] || z > kAlongZ;
+  }
+  return sawn;
 }
 
 Box Joint::bounds() const {

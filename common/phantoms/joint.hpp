@@ -1,5 +1,7 @@
 // Several phantom bones in one frame, each at its pose and perhaps sawn off: a joint.
 #pragma once
+#include <array>
+#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
@@ -50,6 +52,7 @@ class Joint final : public PhantomBone {
   [[nodiscard]] double cortical_g_cm3(int bone) const override;
   [[nodiscard]] double marrow_g_cm3(int bone) const override;
   [[nodiscard]] std::vector<Structure> structures() const override;
+  [[nodiscard]] std::array<bool, 2> sawn_ends() const override;
 
   // The first two members that come nearer to each other than `gap_mm`, by name.
   [[nodiscard]] std::optional<std::pair<std::string, std::string>> nearer_than(double gap_mm) const;

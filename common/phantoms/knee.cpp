@@ -50,6 +50,11 @@ Result<void> check_gap(const char* name, double gap_mm, double cartilage_mm, dou
 Result<KneeBones> knee_bones(const BoneRecipe& recipe) {
   auto changes = joint_changes(recipe.changes, kKneeMembers);
   if (!changes) return tl::unexpected(changes.error());
+  for (const auto& [name, value] : changes->own)
+    if (std::ranges::find(kKneeFields, name, &KneeField::name) == std::end(kKneeFields))
+      return bad_input("\"" + name +
+                       "\" is no parameter of a knee; write one of joint_gap_mm, patella_gap_mm, insall_salvati, "
+                       "femur_cut_mm, tibia_cut_mm, or one of a bone after its name, such as femur.length_mm");
   KneeBones found;
   KneeParameters& k = found.knee;
   if (recipe.preset == "female" || recipe.preset == "small")

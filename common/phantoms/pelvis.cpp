@@ -83,8 +83,10 @@ PelvisParameters pelvis_preset(std::string_view name) {
     scale_pelvis(p, 0.93);
     p.hip_centres_mm = 174.0;
     p.acetabulum_diameter_mm = 47.0;
-    p.anteversion_degrees = 22.0;
-    p.spines_mm = 232.0;
+    p.anteversion_degrees = 21.3;
+    p.spines_mm = 238.0;
+    p.spine_height_mm = 74.0;
+    p.tubercle_depth_mm = 18.7;
     p.crests_mm = 272.0;
     p.posterior_spines_mm = 100.0;
     p.tubercles_mm = 62.0;
@@ -324,7 +326,7 @@ void Pelvis::place_ilium() {
       // The ends of the crest. Only one ball reaches to the tip of each spine, so the tip is where it is said to be.
       {in_wing(0.86, 0.75), 0.5 * p_.crest_mm, posterior_spine_ - 8.0 * back, 0.6 * spine, blend},
       {tail, 7.0 * u, posterior_spine_, spine, knob},
-      {in_wing(0.20, 0.92), 6.5 * u, spine_ + 5.0 * back, 7.0 * u, knob},
+      {in_wing(0.20, 0.92), 6.5 * u, spine_ + 8.5 * back, 7.2 * u, 1.5 * knob},
       {in_wing(0.12, 0.75), 5.5 * u, spine_, spine, knob},
   };
   ilium_bottom_ = -10.0 * u;
@@ -348,12 +350,18 @@ void Pelvis::place_pubis_and_ischium() {
   const auto on_ring = [&](double across, double up) {
     return Vec3(foramen_ + across * width * foramen_across_ + up * height * foramen_up_);
   };
+  // In the rim's plane, the notch of the acetabulum is where it is lowest. Behind it lies bone.
+  const Vec3 notch = (-Vec3::UnitZ() + opening_.z() * opening_).normalized();
+  const auto at_notch = [&](double down, double deep) {
+    return Vec3(centre_ + down * r * notch - deep * r * opening_);
+  };
   const Vec3 upper_tuberosity = at.tuberosity + Vec3(7.0 * u, -7.0 * u, 24.0 * u);
   pubis_ = {
       {at.crest, 7.0 * u, at.ramus, 7.5 * u, blend},  // superior ramus
       {at.ramus, 7.5 * u, {centre_.x() - 0.75 * r, 0.65 * r, -2.0 * u}, 11.0 * u, blend},
       {at.ischium, 14.0 * u, upper_tuberosity, 11.5 * u, blend},
       {centre_ + Vec3(-0.5 * r, -0.1 * r, -0.75 * r), 10.0 * u, upper_tuberosity, 9.0 * u, blend},
+      {at_notch(0.7, 0.85), 7.5 * u, at_notch(1.2, 0.40), 7.5 * u, blend},
       {on_ring(1.0, 0.0), 5.0 * u, upper_tuberosity, 8.0 * u, blend},
       {on_ring(0.7, -0.7), 5.0 * u, at.tuberosity, 5.0 * u, blend},
       {at.pubis_corner, 6.0 * u, on_ring(0.0, -1.0), 5.5 * u, blend},  // inferior ramus
@@ -364,10 +372,7 @@ void Pelvis::place_pubis_and_ischium() {
       {at.tubercle, tubercle, at.tubercle - Vec3(3.0 * u, 6.0 * u, 2.0 * u), tubercle, kKnobBlend * u},
   };
   pubis_top_z_ = r * (1.0 + kWall) + 2.0 * u;
-  // In the rim's plane, the notch is where it is lowest.
-  const Vec3 notch = (-Vec3::UnitZ() + opening_.z() * opening_).normalized();
-  fossa_ = {centre_ - 0.64 * r * opening_, 0.42 * r, centre_ + 1.05 * r * notch - 0.08 * r * opening_, 0.34 * r,
-            kRimBlend};
+  fossa_ = {at_notch(0.0, 0.64), 0.42 * r, at_notch(1.05, 0.0), 0.32 * r, kRimBlend};
 }
 
 // From 0 at 0 to 0 at 1, and 1 at `top`. Constant beyond.
@@ -588,7 +593,7 @@ BoneAnatomy Pelvis::anatomy() const {
     for (const auto& landmark : landmarks) found.landmarks.push_back({prefix + landmark.name, world(landmark.at)});
     found.axes.push_back({prefix + "acetabular opening", world(centre_), world(opening_)});
   }
-  found.planes.push_back({"anterior pelvic plane", {0.0, -p_.plane_forward_mm, 0.0}, -Vec3::UnitY()});
+  found.planes.push_back({"anterior pelvic plane", {0.0, -p_.plane_forward_mm, 0.0}, {0.0, -1.0, 0.0}});
   return found;
 }
 

@@ -14,13 +14,13 @@ struct PelvisParameters {
   double hip_centres_mm = 180.0;
   double acetabulum_diameter_mm = 52.0;
   double acetabulum_depth = 0.9;
-  double inclination_degrees = 40.0, anteversion_degrees = 18.0;
+  double inclination_degrees = 40.0, anteversion_degrees = 18.5;
   double plane_forward_mm = 40.0;
-  double spines_mm = 240.0, spine_height_mm = 72.0;
+  double spines_mm = 238.0, spine_height_mm = 76.0;
   double posterior_spines_mm = 98.0, posterior_spine_height_mm = 88.0, posterior_spine_back_mm = 112.0;
   double crests_mm = 280.0, crest_height_mm = 132.0;
   double wing_mm = 6.0, crest_mm = 13.0;
-  double tubercles_mm = 60.0, tubercle_depth_mm = 15.0;
+  double tubercles_mm = 60.0, tubercle_depth_mm = 16.7;
   double symphysis_mm = 37.0;
   double tuberosities_mm = 114.0, tuberosity_depth_mm = 90.0, tuberosity_back_mm = 28.0;
   double foramen_width_mm = 34.0, foramen_height_mm = 44.0;

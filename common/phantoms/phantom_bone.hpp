@@ -1,5 +1,6 @@
 // A bone of known shape, tissue and density: a closed form of its parameters. Each kind of bone is one pair of files.
 #pragma once
+#include <array>
 #include <functional>
 #include <map>
 #include <memory>
@@ -75,6 +76,8 @@ class PhantomBone {
   [[nodiscard]] virtual double cancellous_g_cm3(const Vec3& at_mm) const = 0;
   [[nodiscard]] virtual double cortical_g_cm3(int bone) const = 0;
   [[nodiscard]] virtual double marrow_g_cm3(int bone) const = 0;
+  // Whether it is sawn off below and above, along z: there a scan ends in bone, as one of a patient does.
+  [[nodiscard]] virtual std::array<bool, 2> sawn_ends() const { return {}; }
   // They never reach into bone. The bone must outlive them.
   [[nodiscard]] virtual std::vector<Structure> structures() const { return {}; }
 

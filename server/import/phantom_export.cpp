@@ -47,15 +47,22 @@ BlurredHu blurred_hu(const phantoms::PhantomBone& bone, double blur_mm) {
 }
 
 ScannerSettings scanner_around(const phantoms::PhantomBone& bone, ScannerSettings settings, double slice_mm) {
-  const Box box = bone.bounds_of_all();
-  const Vec3 size = box.size_mm() + Vec3::Constant(2.0 * kFieldAround_mm);
+  const Box box = bone.bounds_of_all(), around = box.grown(kFieldAround_mm);
+  const Vec3 size = around.size_mm();
   const double tilt = std::abs(settings.tilt_degrees) * std::numbers::pi / 180.0;
   settings.centre_mm = box.centre_mm();
   settings.width_mm = size.x();
   settings.height_mm = size.y() / std::cos(tilt);
-  // Tilted slices reach less far along z in front than behind. The gaps are along the slices' normal.
-  const double length_mm = (size.z() + size.y() * std::tan(tilt)) * std::cos(tilt);
-  settings.gaps_mm.assign(static_cast<std::size_t>(std::ceil(length_mm / slice_mm)), slice_mm);
+  // Tilted slices reach less far along z in front than behind. The gaps are along the slices' normal. Whole slices are
+  // beyond an end of the bone, and before a sawn one.
+  const double lean_mm = 0.5 * size.y() * std::tan(tilt);
+  const auto [sawn_below, sawn_above] = bone.sawn_ends();
+  const double low = sawn_below ? box.min_mm.z() + lean_mm : around.min_mm.z() - lean_mm;
+  const double high = sawn_above ? box.max_mm.z() - lean_mm : around.max_mm.z() + lean_mm;
+  settings.centre_mm.z() = 0.5 * (low + high);
+  const double slices = std::max(2.0, (high - low) * std::cos(tilt) / slice_mm);
+  const double gaps = sawn_below || sawn_above ? std::floor(slices) - 1.0 : std::ceil(slices);
+  settings.gaps_mm.assign(static_cast<std::size_t>(gaps), slice_mm);
   settings.thickness_mm = slice_mm;
   return settings;
 }

@@ -16,7 +16,8 @@ inline constexpr double kAroundBone_hu = 40.0;
 // must outlive it.
 [[nodiscard]] BlurredHu blurred_hu(const phantoms::PhantomBone& bone, double blur_mm);
 
-// Settings with slices that cover the bone and its structures, `slice_mm` apart and thick.
+// Settings with slices that cover the bone and its structures, `slice_mm` apart and thick. At a sawn end they end in
+// bone, so that what is open there is not taken for a hole.
 [[nodiscard]] ScannerSettings scanner_around(const phantoms::PhantomBone& bone, ScannerSettings settings,
                                              double slice_mm);
 

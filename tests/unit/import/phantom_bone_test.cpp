@@ -1,6 +1,7 @@
 // Phantom bones through the importer: parameter files, the program's outputs, and a femur that comes back from a CT.
 #include "common/phantoms/phantom_case.hpp"
 
+#include <array>
 #include <cmath>
 #include <cstdio>
 #include <fstream>
@@ -36,6 +37,14 @@ TEST(BoneRecipeFile, KeepsWhatTheFileDoesNotName) {
   ASSERT_TRUE(recipe) << recipe.error().message;
   EXPECT_EQ(recipe->kind, "tibia");
   EXPECT_EQ(recipe->preset, "large");
+}
+
+TEST(BoneRecipeFile, ReadsParametersOfTheBonesOfAJoint) {
+  const auto recipe =
+      parse_bone_recipe("parameters: {joint_gap_mm: 4, femur.length_mm: 402.5}\n", "f.yaml", {.kind = "knee"});
+  ASSERT_TRUE(recipe) << recipe.error().message;
+  EXPECT_EQ(recipe->changes, (std::map<std::string, double>{{"femur.length_mm", 402.5}, {"joint_gap_mm", 4.0}}));
+  EXPECT_TRUE(phantoms::make_bone(*recipe));
 }
 
 TEST(BoneRecipeFile, FaultsNameTheFileTheFieldAndTheRemedy) {
@@ -222,6 +231,66 @@ TEST(PhantomBoneCt, ATibiaAndItsFibulaComeBackAsTwoBones) {
   CtAgreement agreement;
   scan_and_compare(**bone, options, agreement);
   EXPECT_GE(agreement.dice, 0.97);
+}
+
+// A point deep in the cortex of a bone, far from the ends of a tilted scan.
+Vec3 cortex_of(const phantoms::PhantomBone& bone, int number) {
+  CoordBox box = covering_samples(bone.bounds(), 1.0);
+  box.min.z += 45;
+  box.max.z -= 45;
+  Vec3 found = Vec3::Zero();
+  double deepest = 0.0;
+  for (int x = box.min.x; x <= box.max.x; ++x)
+    for (int y = box.min.y; y <= box.max.y; ++y)
+      for (int z = box.min.z; z <= box.max.z; ++z) {
+        const phantoms::BoneDepths at = bone.depths(position_mm({x, y, z}, 1.0));
+        const double depth = std::min(-at.surface_mm, at.cortex_mm);
+        if (at.bone != number || depth <= deepest) continue;
+        deepest = depth;
+        found = position_mm({x, y, z}, 1.0);
+      }
+  return found;
+}
+
+// The scan ends in femur, tibia and fibula. Each bone grows from a seed.
+TEST(PhantomBoneCt, AKneeComesBackAsFourBones) {
+  const auto knee = phantoms::make_bone({.kind = "knee"});
+  ASSERT_TRUE(knee) << knee.error().message;
+  const test::TempDir folder;
+  ScannerSettings settings{.pixel_mm = 0.8, .blur_mm = 0.5, .noise_hu = 30.0, .tilt_degrees = 12.0};
+  settings = scanner_around(**knee, settings, 3.0);
+  ASSERT_TRUE(write_simulated_scan(settings, blurred_hu(**knee, settings.blur_mm), folder / "ct", keep_going));
+  auto scan = read_dicom_series(folder / "ct", keep_going);
+  ASSERT_TRUE(scan) << scan.error().message;
+  CtOptions options;
+  options.pitch_mm = 1.0;
+  options.separate = true;
+  for (int bone = 1; bone <= 4; ++bone) options.grow.seeds_mm.push_back(cortex_of(**knee, bone));
+  const auto made = import_ct(std::move(*scan), options, keep_going);
+  ASSERT_TRUE(made) << made.error().message;
+
+  // Where every slice has the whole width of the leg.
+  const Box field = (*knee)->bounds().grown(-30.0), around = (*knee)->bounds().grown(4.0);
+  CoordBox box = covering_samples(around, 1.0);
+  box.min.z = static_cast<int>(field.min_mm.z());
+  box.max.z = static_cast<int>(field.max_mm.z());
+  std::array<double, 4> both{}, sum{};
+  for (int x = box.min.x; x <= box.max.x; ++x)
+    for (int y = box.min.y; y <= box.max.y; ++y)
+      for (int z = box.min.z; z <= box.max.z; ++z) {
+        const Vec3 at = position_mm({x, y, z}, 1.0);
+        const phantoms::BoneDepths depths = (*knee)->depths(at);
+        const int real = depths.surface_mm < 0.0 ? depths.bone : 0;
+        const int there = made->bone->surface_mm(at) < 0.0 ? made->bone->bone_number({x, y, z}) : 0;
+        if (real > 0) sum[static_cast<std::size_t>(real) - 1] += 1.0;
+        if (there > 0 && there <= 4) sum[static_cast<std::size_t>(there) - 1] += 1.0;
+        if (real > 0 && real == there) both[static_cast<std::size_t>(real) - 1] += 1.0;
+      }
+  for (std::size_t bone = 0; bone < 4; ++bone) {
+    const double dice = 2.0 * both[bone] / sum[bone];
+    std::printf("[          ] %s: Dice %.4f\n", (*knee)->names()[bone].c_str(), dice);
+    EXPECT_GE(dice, 0.95);
+  }
 }
 
 }  // namespace

@@ -118,7 +118,8 @@ TEST(Joint, ASawnBoneEndsAtThePlaneAndLiesOpen) {
     EXPECT_EQ(joint.tissue(middle), BoneTissue::marrow);
     EXPECT_NEAR(joint.depths(middle).surface_mm, -1.0, 1e-9);
   }
-  EXPECT_LT(joint.bounds().max_mm.z(), 160.0);
+  EXPECT_NEAR(joint.bounds().max_mm.z(), 150.0, 1e-9);
+  EXPECT_EQ(joint.sawn_ends(), (std::array{false, true}));
   EXPECT_LT(joint.bounds().size_mm().x(), 0.8 * bone->bounds().size_mm().x());
 }
 

@@ -171,7 +171,7 @@ TEST(Knee, WhatDoesNotFitIsOneSentenceThatNamesTheParameter) {
   refused({{"femur.neck_height_mm", 46.0}}, "femur: neck_height_mm", "head_diameter_mm");
   refused({{"tibia.wing_mm", 1.0}}, "tibia: \"wing_mm\"", "no parameter");
   refused({{"wing.length_mm", 1.0}}, "\"wing.length_mm\"", "femur., tibia., patella.");
-  refused({{"length_mm", 400.0}}, "\"length_mm\"", "joint_gap_mm");
+  refused({{"length_mm", 400.0}}, "\"length_mm\"", "femur.length_mm");
   refused({{"joint_gap_mm", 4.0}, {"femur.cartilage_mm", 2.5}, {"tibia.cartilage_mm", 2.5}}, "joint_gap_mm is 4",
           "cartilage_mm of femur and tibia");
   refused({{"patella_gap_mm", 4.0}, {"patella.cartilage_mm", 3.0}}, "patella_gap_mm is 4",

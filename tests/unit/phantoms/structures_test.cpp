@@ -193,7 +193,7 @@ struct Labelled {
   PhantomCase made;
   std::map<std::string, int> values;
 
-  [[nodiscard]] std::string at(const Vec3& p) const {
+  [[nodiscard]] int at(const Vec3& p) const {
     const ScanGeometry& geometry = made.scan.geometry;
     const Vec3 voxel = (p - geometry.origin_mm) / made.bone.pitch_mm();
     std::size_t index = 0;
@@ -201,10 +201,7 @@ struct Labelled {
       const auto size = static_cast<std::size_t>(geometry.dims[static_cast<std::size_t>(axis)]);
       index = index * size + static_cast<std::size_t>(std::lround(voxel[axis]));
     }
-    const int value = made.scan.labels[index];
-    for (const auto& [name, known] : values)
-      if (known == value) return name;
-    return "";
+    return made.scan.labels[index];
   }
 };
 
@@ -219,7 +216,7 @@ Labelled labelled(const PhantomBone& bone, double pitch_mm) {
 
 TEST(Structures, AreLabelsOfTheScanWithTheirKindAndHu) {
   const auto tibia = bone_of({.kind = "tibia"});
-  const Labelled found = labelled(*tibia, 1.0);
+  const Labelled found = labelled(*tibia, 1.25);
   std::map<int, double> hu;
   std::map<int, LabelKind> kinds;
   for (const Structure& one : tibia->structures()) {
@@ -237,7 +234,7 @@ TEST(Structures, AreLabelsOfTheScanWithTheirKindAndHu) {
     if (const int label = found.made.scan.labels[n]; hu.contains(label)) {
       ASSERT_EQ(found.made.scan.hu[n], hu[label]);
       ASSERT_EQ(found.made.scan.tissue[n], 0);
-      volume[label] += 1.0;
+      volume[label] += std::pow(found.made.bone.pitch_mm(), 3);
     }
   // A tube: its line's length times its section, and two half balls.
   for (const auto& [name, radius] : {std::pair{"common peroneal nerve", 2.5}, {"anterior tibial artery", 2.0}}) {
@@ -251,10 +248,11 @@ TEST(Structures, AreLabelsOfTheScanWithTheirKindAndHu) {
 double thickness_mm(const Labelled& found, const std::string& name, const std::vector<std::pair<Vec3, Vec3>>& rays,
                     double from_mm = 0.0, double to_mm = 20.0) {
   constexpr double kStep_mm = 0.05;
+  const int label = found.values.at(name);
   double sum = 0.0;
   for (const auto& [from, way] : rays)
     for (double t = from_mm; t < to_mm; t += kStep_mm)
-      sum += found.at(from + t * way) == name ? kStep_mm / static_cast<double>(rays.size()) : 0.0;
+      sum += found.at(from + t * way) == label ? kStep_mm / static_cast<double>(rays.size()) : 0.0;
   return sum;
 }
 
