@@ -24,9 +24,9 @@ struct PhantomCase {
 
 // The surface is the Euclidean distance to the bone's zero. The density of a sample is its mean over a pitch of depth.
 // Labels are "cortical", "cancellous" and "marrow", after the bone's name if there are several, and then one for each
-// structure; those without a voxel are left out. Structures are in the scan only, not in what is cut. Landmarks and
-// axes are those of the bone, and the provenance of the first label has its parameters. Errors: invalid_input (a pitch
-// that is too coarse for the cortex or too fine for the memory), cancelled, internal.
+// structure; those without a voxel are left out. Structures are in the scan only, not in what is cut. Landmarks, axes
+// and planes are those of the bone, and the provenance of the first label has its parameters. Errors: invalid_input (a
+// pitch that is too coarse for the cortex or too fine for the memory), cancelled, internal.
 [[nodiscard]] Result<PhantomCase> build_phantom_case(const PhantomBone& bone, const PhantomCaseOptions& options,
                                                      const KeepGoing& keep_going);
 
