@@ -18,7 +18,7 @@ def toward(direction):
 
 def outward(entry):
     """The direction from an entry to the surgeon. It has any length."""
-    return -np.array(entry["axis"]) if is_on_shaft(entry) else np.array(entry["toward"], dtype=float)
+    return -np.array(entry["axis"]) if is_placed(entry) else np.array(entry["toward"], dtype=float)
 
 
 def from_two_sides(first, second):
@@ -26,15 +26,15 @@ def from_two_sides(first, second):
     return [toward(first), toward(second), toward(np.array(first) + [0.0, 0.3, 0.0])]
 
 
-def is_on_shaft(entry):
-    """Whether the entry is one of on_phantom, along a shaft or upright."""
+def is_placed(entry):
+    """Whether the entry is a point with an axis, as on a phantom, and not a direction."""
     return "point_mm" in entry
 
 
 def on_phantom(case, bone):
     """Entries of two surgeons and of an instructor on a phantom bone.
 
-    `case` has landmarks and axes in mm, LPS. deploy/docs/phantoms.md says where the surgeons work.
+    `case` has landmarks and axes in mm, LPS. deploy/docs/guide.md says where the surgeons work.
     """
     marks = {mark["name"]: np.array(mark["point_mm"]) for mark in case["landmarks"]}
     if bone in ("femur", "tibia"):
@@ -112,8 +112,8 @@ def burr_window(entry, size_mm):
 
 
 def drill_and_window(entry):
-    """A 3.2 mm hole, and a small window burred beside it, or below it on the shaft of a long bone."""
-    beside, size_mm = ([0, 14], [7, 10]) if is_on_shaft(entry) else ([14, 0], [10, 7])
+    """A 3.2 mm hole, and a small window burred beside it, or below it on a phantom."""
+    beside, size_mm = ([0, 14], [7, 10]) if is_placed(entry) else ([14, 0], [10, 7])
     return {"steps": [
         {"action": "drill", "tool": "drill-3.2", "spindle_rpm": 1000, "hand": "expert", "entry": entry},
         {"action": "wait", "seconds": 0.5},
@@ -124,7 +124,7 @@ def drill_and_window(entry):
 
 def window(entry, size_mm, then_s):
     """A window, longest along the shaft of a long bone. Afterwards the hand stays for a time."""
-    size_mm = sorted(size_mm) if is_on_shaft(entry) else size_mm
+    size_mm = sorted(size_mm) if is_placed(entry) else size_mm
     return {"steps": [burr_window(entry, size_mm), {"action": "wait", "seconds": then_s}]}
 
 

@@ -38,7 +38,9 @@ void take_fields(const YAML::Node& root, phantoms::BoneRecipe& recipe) {
     if (!pair.first.IsScalar())
       throw YamlFault{std::string("a name in parameters is not a word; ") + kParameterList.remedy};
     const std::string name = bounded_text(pair.first.Scalar(), 60);
-    recipe.changes[name] = number_of(pair.second, name, -kMostParameter, kMostParameter);
+    const double value =
+        number_of(pair.second, name, -kMostParameter, kMostParameter, "write a number, such as 40 or 0.5");
+    if (!recipe.changes.emplace(name, value).second) throw YamlFault{name + " is there twice; remove one"};
   }
 }
 

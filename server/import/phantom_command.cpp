@@ -5,6 +5,7 @@
 #include <optional>
 #include <string>
 #include <system_error>
+#include <utility>
 #include <vector>
 
 #include "common/geometry/mesh_file.hpp"
@@ -34,6 +35,7 @@ struct PhantomArguments {
   double width_mm = 20.0, slice_mm = 1.0;
   ScannerSettings scanner;
   std::vector<const CLI::Option*> bone_options;  // which a block or a tube does not have
+  const CLI::Option* width = nullptr;            // which a bone does not have
 };
 
 // Removes what a command wrote before it failed.
@@ -43,10 +45,23 @@ void remove_outputs(std::initializer_list<std::string> paths) {
     if (!path.empty()) fs::remove_all(path, error);
 }
 
+// Every output is free, and none lies in the folder of another.
 Result<void> check_outputs(const PhantomArguments& a) {
-  for (const std::string& path : {a.out, a.dicom, a.stl, a.truth})
-    if (!path.empty())
-      if (auto is_free = check_free(path); !is_free) return is_free;
+  const std::pair<const char*, const std::string&> outputs[] = {
+      {"--out", a.out}, {"--dicom", a.dicom}, {"--stl", a.stl}, {"--truth", a.truth}};
+  if (a.out.empty()) return bad_input("--out needs the name of a folder");
+  const auto whole = [](const std::string& path) { return fs::absolute(path).lexically_normal(); };
+  for (const auto& [option, path] : outputs) {
+    if (path.empty()) continue;
+    if (auto is_free = check_free(path); !is_free) return is_free;
+    for (const auto& [folder_option, folder] : outputs) {
+      if (folder.empty() || option == folder_option) continue;
+      const fs::path within = whole(path).lexically_relative(whole(folder));
+      if (!within.empty() && *within.begin() != "..")
+        return bad_input(std::string(option) + " " + path + " lies in the folder of " + folder_option +
+                         "; name another place");
+    }
+  }
   return {};
 }
 
@@ -148,6 +163,7 @@ Result<std::string> run_phantom(const PhantomArguments& a, const StopSignal& sto
     return bad_input("a " + a.kind +
                      " needs --layers; write THICKNESS_MM:DENSITY_G_CM3,... such as 5:1.9,20:0.3,5:1.9");
   if (!layered && !a.layers.empty()) return bad_input("a " + a.kind + " has no --layers; leave them out");
+  if (!layered && a.width->count() > 0) return bad_input("a " + a.kind + " has no --width; leave it out");
   for (const CLI::Option* option : a.bone_options)
     if (layered && option->count() > 0)
       return bad_input(option->get_name() + " is for a bone, such as a femur; leave it out for a " + a.kind);
@@ -199,9 +215,9 @@ void add_phantom_command(CLI::App& app, std::vector<Command>& commands) {
       ->check(CLI::IsMember(kinds));
   phantom->add_option("--layers", a.layers,
                       "Of a block or tube: THICKNESS_MM:DENSITY_G_CM3,... such as 5:1.9,20:0.3,5:1.9");
-  phantom->add_option("--width", a.width_mm, "Edge of the block, or length of the tube, mm")
-      ->check(within(1.0, 1000.0))
-      ->capture_default_str();
+  a.width = phantom->add_option("--width", a.width_mm, "Edge of the block, or length of the tube, mm")
+                ->check(within(1.0, 1000.0))
+                ->capture_default_str();
   phantom->add_option("--pitch", a.pitch_mm, "Voxel edge, mm (default: 0.4; of a bone 0.7)")->check(within(0.02, 10.0));
   phantom->add_option("--out", a.out, "Folder of the case, made by this command")->required();
   CLI::Option* dicom = phantom->add_option(

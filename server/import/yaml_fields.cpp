@@ -90,16 +90,18 @@ void check_fields(const YAML::Node& entry, const std::string& what, const std::v
       throw YamlFault{std::string(field) + " is missing; " + what + " needs " + names_of(needed)};
 }
 
-double number_of(const YAML::Node& node, const std::string& field, double least, double most) {
-  std::array<char, 100> remedy{};
-  std::snprintf(remedy.data(), remedy.size(), "; write a number from %g to %g", least, most);
-  if (!node.IsScalar()) throw YamlFault{field + " is not a single number" + remedy.data()};
+double number_of(const YAML::Node& node, const std::string& field, double least, double most,
+                 const std::string& remedy) {
+  std::array<char, 100> range{};
+  std::snprintf(range.data(), range.size(), "write a number from %g to %g", least, most);
+  const std::string what_to_do = "; " + (remedy.empty() ? range.data() : remedy);
+  if (!node.IsScalar()) throw YamlFault{field + " is not a single number" + what_to_do};
   const std::string& text = node.Scalar();
   double value = 0.0;
   const char* from = text.data() + (text.starts_with('+') ? 1 : 0);
   const auto [end, error] = std::from_chars(from, text.data() + text.size(), value);
   if (error != std::errc{} || end != text.data() + text.size() || !(value >= least && value <= most))
-    throw YamlFault{field + " is " + quoted_value(text) + remedy.data()};
+    throw YamlFault{field + " is " + quoted_value(text) + what_to_do};
   return value;
 }
 

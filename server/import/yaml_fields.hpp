@@ -40,7 +40,9 @@ struct YamlList {
 // entry, such as "paint".
 void check_fields(const YAML::Node& entry, const std::string& what, const std::vector<std::string_view>& needed,
                   const std::vector<std::string_view>& optional);
-[[nodiscard]] double number_of(const YAML::Node& node, const std::string& field, double least, double most);
+// `remedy`: of a fault; without one, the fault names the range.
+[[nodiscard]] double number_of(const YAML::Node& node, const std::string& field, double least, double most,
+                               const std::string& remedy = {});
 // [x, y, z], mm, within 100 m.
 [[nodiscard]] Vec3 position_of(const YAML::Node& node, const std::string& field);
 // A value of a file for an error: bounded, in quotation marks.

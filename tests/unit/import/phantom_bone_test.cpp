@@ -62,7 +62,8 @@ TEST(BoneRecipeFile, FaultsNameTheFileTheFieldAndTheRemedy) {
   refused("length_mm: 400\n", "length_mm");
   refused("parameters: 400\n", "not a map");
   refused("parameters: {length_mm: long}\n", "length_mm is \"long\"");
-  refused("parameters: {length_mm: .nan}\n", "length_mm");
+  refused("parameters: {length_mm: .nan}\n", "length_mm is \".nan\"; write a number, such as");
+  refused("parameters: {length_mm: 400, length_mm: 410}\n", "length_mm is there twice");
   refused("preset: {female\n", "not YAML");
 }
 
@@ -140,6 +141,9 @@ TEST(PhantomProgram, RefusesInOneSentenceAndWritesNothing) {
   refused({"femur", "--parameters", (folder / "bad.yaml").string()}, "neck_shaft_degrees is 150");
   refused({"femur", "--parameters", (folder / "none.yaml").string()}, "none.yaml");
   refused({"femur", "--layers", "5:1.9"}, "has no --layers");
+  refused({"femur", "--width", "20"}, "has no --width");
+  refused({"femur", "--dicom", out + "/ct"}, "--dicom " + out + "/ct lies in the folder of --out");
+  refused({"femur", "--truth", out + "/../case"}, "lies in the folder of");
   refused({"femur", "--noise", "10"}, "--noise requires --dicom");
   for (const char* option : {"--side", "--noise"})
     refused({"block", "--layers", "5:1.9", "--dicom", out + "-ct", option, option[2] == 's' ? "left" : "10"},
@@ -293,6 +297,7 @@ void expect_back_apart(const phantoms::PhantomBone& joint, double least_dice, co
         const int real = depths.surface_mm < 0.0 ? depths.bone : 0;
         const int there = made->bone->surface_mm(at) < 0.0 ? made->bone->bone_number({x, y, z}) : 0;
         if (real > 0) sum[static_cast<std::size_t>(real) - 1] += 1.0;
+        EXPECT_LE(there, bones) << "a bone without a seed";
         if (there > 0 && there <= bones) sum[static_cast<std::size_t>(there) - 1] += 1.0;
         if (real > 0 && real == there) both[static_cast<std::size_t>(real) - 1] += 1.0;
       }
@@ -309,7 +314,7 @@ TEST(PhantomBoneCt, AKneeComesBackAsFourBones) {
   expect_back_apart(**knee, 0.95);
 }
 
-// The neck of a femur is shallower than the joint in such slices, so the head needs a seed of its own.
+// In slices this thick, the import divides the femur at its neck and not at the joint, so the head needs its own seed.
 TEST(PhantomBoneCt, AHipComesBackAsTwoBones) {
   const auto hip = phantoms::make_bone({.kind = "hip"});
   ASSERT_TRUE(hip) << hip.error().message;
