@@ -416,7 +416,9 @@ Result<void> Case::write(const std::filesystem::path& folder, const CaseScan* sc
   const fs::path target = partial;
   partial += ".partial-" + std::to_string(::getpid());
   fs::create_directories(partial, error);
-  if (error) return failure(ErrorCode::internal, "cannot make the folder " + partial.string() + ": " + error.message());
+  if (error)
+    return failure(ErrorCode::internal, "cannot make the folder " + target.string() + ": " + error.message() +
+                                            "; choose a place where you may write");
 
   const auto write_files = [&]() -> Result<void> {
     const auto& g = *grids_;

@@ -16,7 +16,9 @@ Result<void> write_new_folder(const fs::path& folder, const std::function<Result
   fs::path partial = target;
   partial += ".partial-" + std::to_string(::getpid());
   fs::create_directories(partial, error);
-  if (error) return failure(ErrorCode::internal, "cannot make the folder " + partial.string() + ": " + error.message());
+  if (error)
+    return failure(ErrorCode::internal, "cannot make the folder " + target.string() + ": " + error.message() +
+                                            "; choose a place where you may write");
 
   Result<void> written = write(partial);
   if (written) {

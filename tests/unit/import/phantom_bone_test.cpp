@@ -155,6 +155,15 @@ TEST(PhantomProgram, RefusesInOneSentenceAndWritesNothing) {
   refused({"tube", "--layers", "5:1.9", "--side", "left"}, "--side");
   refused({"femur", "--pitch", "0.03"}, "--pitch");
   refused({"wing"}, "wing");
+
+  // A file is where a folder must be.
+  const std::string file = (folder / "bad.yaml").string();
+  for (const char* option : {"--dicom", "--truth"})
+    refused({"patella", option, file + "/ct"}, "cannot make the folder " + file + "/ct: Not a directory; choose");
+  const auto run = test::run(OSTEON_IMPORT_PROGRAM, {"phantom", "patella", "--out", file + "/case"});
+  EXPECT_NE(run.exit_code, 0);
+  EXPECT_NE(run.err.find("cannot make the folder " + file + "/case: Not a directory; choose"), std::string::npos)
+      << run.err;
 }
 
 struct Sums {
