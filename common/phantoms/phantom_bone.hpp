@@ -43,6 +43,8 @@ struct BoneDepths {
   double marrow_mm = 0.0;   // the end of marrow, negative in the canal
   int bone = 1;             // number of the nearest bone, from 1
 };
+// How fast BoneDepths::surface_mm grows at most, mm per mm.
+inline constexpr double kSteepest = 1.6;
 
 [[nodiscard]] BoneTissue tissue_of(const BoneDepths& depths);
 
