@@ -2,6 +2,7 @@
 #pragma once
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdio>
 #include <map>
 #include <span>
@@ -9,6 +10,7 @@
 #include <string_view>
 #include <vector>
 
+#include "common/core/check.hpp"
 #include "common/phantoms/phantom_bone.hpp"
 
 namespace osteon::phantoms {
@@ -29,6 +31,55 @@ struct ParameterField {
   return bad_input(text.data());
 }
 
+// The field of a name that the table has.
+template <class Parameters>
+[[nodiscard]] const ParameterField<Parameters>& field_of(std::span<const ParameterField<Parameters>> fields,
+                                                         std::string_view name) {
+  const auto field = std::ranges::find(fields, name, &ParameterField<Parameters>::name);
+  OSTEON_CHECK(field != fields.end());
+  return *field;
+}
+
+// Limits of a parameter that follow from other ones. They narrow those of its field.
+struct DependentLimit {
+  std::string_view name;
+  double least, most;
+  std::string_view others;  // from which the limits follow
+};
+inline constexpr double kLimitRounding = 1e-9;  // of a limit that is computed
+
+// "crest_mm is 19, which does not fit wing_mm; give a value from 8 to 18". Limits are rounded to what they allow.
+[[nodiscard]] inline tl::unexpected<Error> does_not_fit(double value, const DependentLimit& limit) {
+  constexpr double kRounded = 0.01;
+  const double least = kRounded * std::ceil((limit.least - kLimitRounding) / kRounded);
+  const double most = kRounded * std::floor((limit.most + kLimitRounding) / kRounded);
+  std::array<char, 80> number{}, range{};
+  std::snprintf(number.data(), number.size(), " is %.5g", value);
+  std::snprintf(range.data(), range.size(), "give a value from %.5g to %.5g", least, most);
+  const std::string others(limit.others);
+  return bad_input(std::string(limit.name) + number.data() + ", which does not fit " + others + "; " +
+                   (least <= most ? range.data() : "change " + others));
+}
+
+// Values outside the limits of their fields, then those outside limits that follow from others. Error: invalid_input,
+// naming the first such parameter and its range.
+template <class Parameters>
+[[nodiscard]] Result<void> check_parameters(const Parameters& parameters,
+                                            std::span<const ParameterField<Parameters>> fields,
+                                            std::span<const DependentLimit> limits) {
+  for (const auto& field : fields)
+    if (const double value = parameters.*field.value; !(value >= field.least && value <= field.most))
+      return bad_parameter(field.name, value, field.least, field.most);
+  for (const DependentLimit& limit : limits) {
+    const auto& field = field_of<Parameters>(fields, limit.name);
+    if (const double value = parameters.*field.value;
+        !(value >= limit.least - kLimitRounding && value <= limit.most + kLimitRounding))
+      return does_not_fit(
+          value, {limit.name, std::max(limit.least, field.least), std::min(limit.most, field.most), limit.others});
+  }
+  return {};
+}
+
 // Sets what `changes` names. Errors: invalid_input, naming the parameter and its range, or the names that there are.
 template <class Parameters>
 [[nodiscard]] Result<void> change(Parameters& parameters, std::span<const ParameterField<Parameters>> fields,
@@ -47,6 +98,13 @@ template <class Parameters>
     parameters.*field->value = value;
   }
   return {};
+}
+
+template <class Parameters>
+[[nodiscard]] std::vector<std::string_view> names_of(std::span<const ParameterField<Parameters>> fields) {
+  std::vector<std::string_view> names;
+  for (const auto& field : fields) names.push_back(field.name);
+  return names;
 }
 
 template <class Parameters>

@@ -1,7 +1,6 @@
 #include "common/phantoms/femur.hpp"
 
 #include <cmath>
-#include <cstdio>
 #include <limits>
 #include <numbers>
 
@@ -130,15 +129,6 @@ FemurParameters preset(std::string_view name) {
   return p;
 }
 
-// A parameter whose limits follow from other ones.
-Result<void> check_beside(const char* name, double value, double least, double most, const char* others) {
-  if (value >= least && value <= most) return {};
-  std::array<char, 240> text{};
-  std::snprintf(text.data(), text.size(), "%s is %.4g, which does not fit %s; give a value from %.4g to %.4g", name,
-                value, others, least, most);
-  return bad_input(text.data());
-}
-
 double squared_distance(const Vec3& at, const Vec3& a, const Vec3& b) {
   return squared_distance_to_segment<double>(at, a, b);
 }
@@ -156,14 +146,6 @@ Profile half_profile(const std::array<double, kFemurStations.size()>& along, con
 std::span<const ParameterField<FemurParameters>> femur_fields() { return kFields; }
 
 Result<void> check_femur(const FemurParameters& p) {
-  for (const Field& field : kFields)
-    if (const double value = p.*field.value; !(value >= field.least && value <= field.most))
-      return bad_parameter(field.name, value, field.least, field.most);
-  for (const Station& s : kStations)
-    if (auto fits = check_beside(s.name, p.*s.cortex, 0.0, 0.38 * std::min(p.*s.width, p.*s.depth),
-                                 "the shaft's width and depth there");
-        !fits)
-      return fits;
   const double large = std::max(p.medial_condyle_radius_mm, p.lateral_condyle_radius_mm);
   const double small = std::min(p.medial_condyle_radius_mm, p.lateral_condyle_radius_mm);
   const double condyles_mm = p.notch_width_mm + 2.0 * p.condyle_width_mm;
@@ -176,31 +158,26 @@ Result<void> check_femur(const FemurParameters& p) {
   const double from_apex_mm = (p.bow_apex - kFlarePart) * p.length_mm;
   const double front_mm = p.condyle_depth_mm - p.medial_condyle_radius_mm - 0.5 * kFlareDepth * p.depth_15_mm +
                           from_apex_mm * from_apex_mm / (2.0 * p.bow_radius_mm);
-  struct Row {
-    const char* name;
-    double value, least, most;
-    const char* others;
-  };
-  const Row rows[] = {
-      {"neck_height_mm", p.neck_height_mm, 0.0, 0.9 * p.head_diameter_mm, "head_diameter_mm"},
-      {"neck_depth_mm", p.neck_depth_mm, 0.0, p.neck_height_mm, "neck_height_mm"},
-      {"offset_mm", p.offset_mm, least_offset_mm, 60.0, "neck_shaft_degrees, head_diameter_mm and width_80_mm"},
-      {"proximal_width_mm", p.proximal_width_mm, beside_mm - 8.0, beside_mm + 22.0,
-       "offset_mm, head_diameter_mm and width_80_mm"},
-      {"lateral_condyle_radius_mm", p.lateral_condyle_radius_mm, p.medial_condyle_radius_mm - 4.0,
-       p.medial_condyle_radius_mm + 4.0, "medial_condyle_radius_mm"},
-      {"condyle_width_mm", p.condyle_width_mm, 0.0, 1.5 * small, "the condyles' radii"},
-      {"condyle_depth_mm", p.condyle_depth_mm, 2.3 * large, 3.8 * small, "the condyles' radii"},
-      {"bicondylar_width_mm", p.bicondylar_width_mm, condyles_mm + 2.0 * kEpicondyleBlend, condyles_mm + 20.0,
+  constexpr double kNoLimit = std::numeric_limits<double>::infinity();
+  std::vector<DependentLimit> limits;
+  for (const Station& s : kStations)
+    limits.push_back({s.name, -kNoLimit, 0.38 * std::min(p.*s.width, p.*s.depth), "the shaft's width and depth there"});
+  const DependentLimit others[] = {
+      {"neck_height_mm", -kNoLimit, 0.9 * p.head_diameter_mm, "head_diameter_mm"},
+      {"neck_depth_mm", -kNoLimit, p.neck_height_mm, "neck_height_mm"},
+      {"offset_mm", least_offset_mm, kNoLimit, "neck_shaft_degrees, head_diameter_mm and width_80_mm"},
+      {"proximal_width_mm", beside_mm - 8.0, beside_mm + 22.0, "offset_mm, head_diameter_mm and width_80_mm"},
+      {"lateral_condyle_radius_mm", p.medial_condyle_radius_mm - 4.0, p.medial_condyle_radius_mm + 4.0,
+       "medial_condyle_radius_mm"},
+      {"condyle_width_mm", -kNoLimit, 1.5 * small, "the condyles' radii"},
+      {"condyle_depth_mm", 2.3 * large, 3.8 * small, "the condyles' radii"},
+      {"bicondylar_width_mm", condyles_mm + 2.0 * kEpicondyleBlend, condyles_mm + 20.0,
        "notch_width_mm and condyle_width_mm"},
-      {"shaft_forward_mm", p.shaft_forward_mm, front_mm - 22.0, front_mm + 2.0,
-       "condyle_depth_mm, depth_15_mm and the bow"},
-      {"trochanters_mm", p.trochanters_mm, 1.1 * p.head_diameter_mm, 0.24 * p.length_mm,
-       "head_diameter_mm and length_mm"},
+      {"shaft_forward_mm", front_mm - 22.0, front_mm + 2.0, "condyle_depth_mm, depth_15_mm and the bow"},
+      {"trochanters_mm", 1.1 * p.head_diameter_mm, 0.24 * p.length_mm, "head_diameter_mm and length_mm"},
   };
-  for (const Row& row : rows)
-    if (auto fits = check_beside(row.name, row.value, row.least, row.most, row.others); !fits) return fits;
-  return {};
+  limits.insert(limits.end(), std::begin(others), std::end(others));
+  return check_parameters<FemurParameters>(p, kFields, limits);
 }
 
 Result<FemurParameters> femur_parameters(const BoneRecipe& recipe) {
@@ -406,8 +383,8 @@ BoneAnatomy Femur::anatomy() const {
   const auto circle = [](const Condyle& condyle) {
     return Vec3(condyle.x, condyle.posterior.y(), condyle.posterior.z());
   };
-  const auto beyond = [&](const Condyle& condyle, const Vec3& way) {
-    return Vec3(circle(condyle) + condyle.radius_mm * way);
+  const auto beyond = [&](const Condyle& condyle, const Vec3& direction) {
+    return Vec3(circle(condyle) + condyle.radius_mm * direction);
   };
   const Vec3 knee = 0.5 * (circle(medial_) + circle(lateral_condyle_));
   const Vec3 medial = epicondyle(medial_), lateral = epicondyle(lateral_condyle_);
@@ -430,11 +407,11 @@ BoneAnatomy Femur::anatomy() const {
   return found;
 }
 
-double Femur::condyles_reach_mm(const Vec3& way) const {
+double Femur::lowest_along_mm(const Vec3& direction) const {
   double least = std::numeric_limits<double>::infinity();
   for (const Condyle* condyle : {&medial_, &lateral_condyle_})
     for (const Vec3& centre : {condyle->posterior, condyle->anterior})
-      least = std::min(least, way.dot(world(centre)) - condyle->radius_mm);
+      least = std::min(least, direction.dot(world(centre)) - condyle->radius_mm);
   return least;
 }
 

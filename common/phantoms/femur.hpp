@@ -73,8 +73,9 @@ class Femur final : public PhantomBone {
   [[nodiscard]] double marrow_g_cm3(int /*bone*/) const override { return p_.marrow_g_cm3; }
   [[nodiscard]] std::vector<Structure> structures() const override;
 
-  // The least `way` · p of both condyles, for a unit vector in a sagittal plane: how far they reach against it.
-  [[nodiscard]] double condyles_reach_mm(const Vec3& way) const;
+  // The smallest dot product of `direction` with any point of the condyles, mm. `direction` is a unit vector with
+  // x = 0.
+  [[nodiscard]] double lowest_along_mm(const Vec3& direction) const;
 
  private:
   // All that follows is in the bone's own directions: x lateral, y anterior, z proximal. It is the same for both sides.

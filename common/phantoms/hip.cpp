@@ -16,25 +16,6 @@ constexpr double kNarrowestGap_mm = 1.0, kWidestGap_mm = 4.0;
 constexpr double kNearest_mm = 1.0;  // elsewhere
 
 constexpr ParameterField<HipParameters> kHipFields[] = {{"shaft_mm", &HipParameters::shaft_mm, 20.0, 150.0}};
-constexpr std::array<std::string_view, 2> kHipMembers{"pelvis", "femur"};
-
-Vec3 hip_point(const PhantomBone& bone, std::string_view name) {
-  for (const Landmark& found : bone.anatomy().landmarks)
-    if (found.name == name) return found.point_mm;
-  return Vec3::Zero();
-}
-
-// "femur.head_diameter_mm is 52, which does not fit pelvis.acetabulum_diameter_mm; give a value from 44 to 50"
-Result<void> check_head(double head_mm, double acetabulum_mm) {
-  const double least = acetabulum_mm - 2.0 * kWidestGap_mm, most = acetabulum_mm - 2.0 * kNarrowestGap_mm;
-  if (head_mm >= least && head_mm <= most) return {};
-  std::array<char, 200> text{};
-  std::snprintf(text.data(), text.size(),
-                "femur.head_diameter_mm is %.4g, which does not fit pelvis.acetabulum_diameter_mm; give a value from "
-                "%.4g to %.4g",
-                head_mm, least, most);
-  return bad_input(text.data());
-}
 
 Result<void> check_cartilage(double acetabulum_mm, double head_mm, double gap_mm) {
   if (acetabulum_mm + head_mm <= gap_mm + 1e-9) return {};
@@ -51,7 +32,9 @@ Result<void> check_cartilage(double acetabulum_mm, double head_mm, double gap_mm
 std::span<const ParameterField<HipParameters>> hip_fields() { return kHipFields; }
 
 Result<std::unique_ptr<PhantomBone>> make_hip(const BoneRecipe& recipe) {
-  auto changes = joint_changes(recipe.changes, kHipMembers);
+  const std::vector<std::string_view> names = names_of<HipParameters>(kHipFields);
+  const MemberParameters bones[] = {{"pelvis", names_of(pelvis_fields())}, {"femur", names_of(femur_fields())}};
+  auto changes = joint_changes("hip", recipe.changes, names, bones);
   if (!changes) return tl::unexpected(changes.error());
   HipParameters own;
   if (auto changed = change<HipParameters>(own, kHipFields, changes->own); !changed)
@@ -66,9 +49,12 @@ Result<std::unique_ptr<PhantomBone>> make_hip(const BoneRecipe& recipe) {
   if (!pelvis) return tl::unexpected(pelvis.error());
   auto femur = of_member("femur", femur_parameters(recipe_of("femur")));
   if (!femur) return tl::unexpected(femur.error());
-  if (auto fits = check_head(femur->head_diameter_mm, pelvis->acetabulum_diameter_mm); !fits)
+  const double socket_mm = pelvis->acetabulum_diameter_mm;
+  const DependentLimit head[] = {{"head_diameter_mm", socket_mm - 2.0 * kWidestGap_mm,
+                                  socket_mm - 2.0 * kNarrowestGap_mm, "pelvis.acetabulum_diameter_mm"}};
+  if (auto fits = of_member("femur", check_parameters<FemurParameters>(*femur, femur_fields(), head)); !fits)
     return tl::unexpected(fits.error());
-  const double gap_mm = 0.5 * (pelvis->acetabulum_diameter_mm - femur->head_diameter_mm);
+  const double gap_mm = 0.5 * (socket_mm - femur->head_diameter_mm);
   if (!changes->members["pelvis"].contains("cartilage_mm")) pelvis->cartilage_mm = 0.5 * gap_mm;
   if (!changes->members["femur"].contains("cartilage_mm"))
     femur->cartilage_mm = std::max(0.5, gap_mm - pelvis->cartilage_mm);
@@ -77,8 +63,8 @@ Result<std::unique_ptr<PhantomBone>> make_hip(const BoneRecipe& recipe) {
 
   JointMember hip_bone{.name = "pelvis", .bone = std::make_unique<Pelvis>(*pelvis, recipe.side)};
   JointMember thigh{.name = "femur", .bone = std::make_unique<Femur>(*femur, recipe.side)};
-  thigh.pose.position_mm = hip_point(*hip_bone.bone, "acetabular centre") - hip_point(*thigh.bone, "head centre");
-  thigh.cut = Cut{hip_point(*thigh.bone, "lesser trochanter") - own.shaft_mm * Vec3::UnitZ(), -Vec3::UnitZ()};
+  thigh.pose.position_mm = point_of(*hip_bone.bone, "acetabular centre") - point_of(*thigh.bone, "head centre");
+  thigh.cut = Cut{point_of(*thigh.bone, "lesser trochanter") - own.shaft_mm * Vec3::UnitZ(), -Vec3::UnitZ()};
   std::vector<JointMember> members;
   members.push_back(std::move(hip_bone));
   members.push_back(std::move(thigh));

@@ -4,12 +4,14 @@
 #include <cmath>
 #include <limits>
 
+#include "common/core/check.hpp"
+
 namespace osteon::phantoms {
 namespace {
 
-constexpr double kBoxStep_mm = 3.0;     // of the search for what a cut leaves
-constexpr double kMeetStep_mm = 0.5;    // of the search for places where members meet
-constexpr double kSteepestJoint = 1.6;  // how fast a distance of a phantom bone may grow at most, mm per mm
+constexpr double kBoxStep_mm = 3.0;   // of the search for what a cut leaves
+constexpr double kMeetStep_mm = 0.5;  // of the search for places where members meet
+constexpr double kOnPlane_mm = 1e-6;  // a point this near a cut lies on it
 
 double outside_mm(const Box& box, const Vec3& at) {
   return (box.min_mm - at).cwiseMax(at - box.max_mm).cwiseMax(0.0).norm();
@@ -49,7 +51,7 @@ Box kept(const Box& box, const std::optional<Cut>& cut) {
   return found;
 }
 
-// The cells of a coarse lattice that the rest of a sawn bone may reach.
+// A box around what a cut leaves, from the cells of a coarse lattice that may hold bone.
 Box box_of(const JointMember& member) {
   const Box whole = kept(member.bone->bounds(), member.cut);
   if (!member.cut) return whole;
@@ -59,22 +61,30 @@ Box box_of(const JointMember& member) {
     for (double y = whole.min_mm.y(); y <= whole.max_mm.y(); y += kBoxStep_mm)
       for (double z = whole.min_mm.z(); z <= whole.max_mm.z(); z += kBoxStep_mm) {
         const Vec3 middle = Vec3(x, y, z).array() + 0.5 * kBoxStep_mm;
-        if (member.bone->depths(middle).surface_mm > kSteepestJoint * reach) continue;
+        if (member.bone->depths(middle).surface_mm > kSteepest * reach) continue;
         box.include({x, y, z});
         box.include(Vec3(x, y, z).array() + kBoxStep_mm);
       }
   return kept(box, member.cut);
 }
 
-// Puts the member's name before each name that occurs in several members.
 template <class Named>
-std::vector<Named> told_apart(std::vector<std::pair<std::string, Named>> all) {
+struct OfMember {
+  std::string member;
+  Named named;
+  bool is_left = true;  // by the member's cut
+};
+
+// What is left. Before each name that occurs in several members stands the member's. So no name depends on a cut.
+template <class Named>
+std::vector<Named> told_apart(std::vector<OfMember<Named>> all) {
   std::map<std::string, int> count;
-  for (const auto& [member, named] : all) ++count[named.name];
+  for (const OfMember<Named>& one : all) ++count[one.named.name];
   std::vector<Named> found;
-  for (auto& [member, named] : all) {
-    if (count[named.name] > 1) named.name = member + ", " + named.name;
-    found.push_back(std::move(named));
+  for (OfMember<Named>& one : all) {
+    if (!one.is_left) continue;
+    if (count[one.named.name] > 1) one.named.name = one.member + ", " + one.named.name;
+    found.push_back(std::move(one.named));
   }
   return found;
 }
@@ -135,12 +145,14 @@ double Joint::marrow_g_cm3(int bone) const {
 }
 
 std::vector<std::string> Joint::names() const {
+  struct Bone {
+    std::string name;
+  };
+  std::vector<OfMember<Bone>> bones;
+  for (const Placed& placed : members_)
+    for (std::string& name : placed.member.bone->names()) bones.push_back({placed.member.name, {std::move(name)}});
   std::vector<std::string> names;
-  for (const Placed& placed : members_) {
-    std::vector<std::string> own = placed.member.bone->names();
-    if (own.size() == 1) own.front() = placed.member.name;
-    names.insert(names.end(), own.begin(), own.end());
-  }
+  for (Bone& bone : told_apart(std::move(bones))) names.push_back(std::move(bone.name));
   return names;
 }
 
@@ -155,46 +167,47 @@ std::vector<NamedValue> Joint::parameters() const {
 }
 
 BoneAnatomy Joint::anatomy() const {
-  std::vector<std::pair<std::string, Landmark>> landmarks;
-  std::vector<std::pair<std::string, PlannedAxis>> axes;
-  std::vector<std::pair<std::string, PlannedPlane>> planes;
+  std::vector<OfMember<Landmark>> landmarks;
+  std::vector<OfMember<PlannedAxis>> axes;
+  std::vector<OfMember<PlannedPlane>> planes;
   for (const Placed& placed : members_) {
     const auto& [name, bone, pose, cut] = placed.member;
     BoneAnatomy own = bone->anatomy();
-    for (Landmark& landmark : own.landmarks)
-      if (beyond_mm(cut, landmark.point_mm) <= 0.0)
-        landmarks.emplace_back(name, Landmark{landmark.name, pose.point(landmark.point_mm)});
+    for (const Landmark& landmark : own.landmarks)
+      landmarks.push_back(
+          {name, {landmark.name, pose.point(landmark.point_mm)}, beyond_mm(cut, landmark.point_mm) <= kOnPlane_mm});
     for (PlannedAxis& axis : own.axes) {
-      if (const double beyond = beyond_mm(cut, axis.point_mm); beyond > 0.0) {
+      bool is_left = true;
+      if (const double beyond = beyond_mm(cut, axis.point_mm); beyond > kOnPlane_mm) {
         const double along = cut->normal.dot(axis.direction);
-        if (std::abs(along) < 1e-6) continue;
-        axis.point_mm -= beyond / along * axis.direction;
-        if (outside_mm(placed.box, axis.point_mm) > 0.0) continue;
+        is_left = std::abs(along) >= 1e-6;
+        if (is_left) axis.point_mm -= beyond / along * axis.direction;
+        is_left = is_left && outside_mm(placed.box, axis.point_mm) <= kOnPlane_mm;
       }
-      axes.emplace_back(name, PlannedAxis{axis.name, pose.point(axis.point_mm), pose.direction(axis.direction)});
+      axes.push_back({name, {axis.name, pose.point(axis.point_mm), pose.direction(axis.direction)}, is_left});
     }
     for (const PlannedPlane& plane : own.planes)
-      planes.emplace_back(name, PlannedPlane{plane.name, pose.point(plane.point_mm), pose.direction(plane.normal)});
+      planes.push_back({name, {plane.name, pose.point(plane.point_mm), pose.direction(plane.normal)}});
   }
   return {told_apart(std::move(landmarks)), told_apart(std::move(axes)), told_apart(std::move(planes))};
 }
 
 std::vector<Structure> Joint::structures() const {
-  std::vector<std::pair<std::string, Structure>> found;
+  std::vector<OfMember<Structure>> found;
   for (const Placed& placed : members_)
     for (Structure& own : placed.member.bone->structures()) {
       if (std::ranges::find(structures_, own.name, &Structure::name) != structures_.end()) continue;
       const Box left = kept(own.bounds, placed.member.cut);
-      if (left.empty()) continue;
-      own.bounds = moved(left, placed.member.pose);
+      const bool is_left = !left.empty();
+      if (is_left) own.bounds = moved(left, placed.member.pose);
       for (Vec3& at : own.line_mm) at = placed.member.pose.point(at);
       own.distance_mm = [this, distance = std::move(own.distance_mm), &placed](const Vec3& at_mm) {
         const Vec3 at = placed.back.point(at_mm);
         const double own_mm = std::max(distance(at), beyond_mm(placed.member.cut, at));
-        // The other bones take what they need.
+        // Where another bone is, there is no structure.
         return own_mm < 0.0 ? std::max(own_mm, -depths(at_mm).surface_mm) : own_mm;
       };
-      found.emplace_back(placed.member.name, std::move(own));
+      found.push_back({placed.member.name, std::move(own), is_left});
     }
   std::vector<Structure> all = told_apart(std::move(found));
   all.insert(all.end(), structures_.begin(), structures_.end());
@@ -237,7 +250,7 @@ bool Joint::meet(const Placed& a, const Placed& b, double gap_mm) const {
     if (farther < 0.5 * gap_mm) return true;
     int longest = 0;
     const double edge = size.maxCoeff(&longest);
-    if (edge < kMeetStep_mm || farther - 0.5 * kSteepestJoint * size.norm() >= 0.5 * gap_mm) continue;
+    if (edge < kMeetStep_mm || farther - 0.5 * kSteepest * size.norm() >= 0.5 * gap_mm) continue;
     Box low = cell, high = cell;
     low.max_mm[longest] = high.min_mm[longest] = middle[longest];
     open.push_back(low);
@@ -253,25 +266,48 @@ std::optional<std::pair<std::string, std::string>> Joint::nearer_than(double gap
   return std::nullopt;
 }
 
-Result<JointChanges> joint_changes(const std::map<std::string, double>& changes,
-                                   std::span<const std::string_view> members) {
+Result<JointChanges> joint_changes(std::string_view kind, const std::map<std::string, double>& changes,
+                                   std::span<const std::string_view> own, std::span<const MemberParameters> members) {
+  OSTEON_CHECK(!members.empty());
   JointChanges found;
-  for (const std::string_view member : members) found.members[std::string(member)];
+  for (const MemberParameters& one : members) found.members[std::string(one.member)];
   for (const auto& [name, value] : changes) {
     const std::size_t dot = name.find('.');
-    if (dot == std::string::npos) {
+    if (dot == std::string::npos && std::ranges::find(own, name) != own.end()) {
       found.own[name] = value;
       continue;
     }
-    const auto member = found.members.find(name.substr(0, dot));
-    if (member == found.members.end()) {
-      std::string all;
-      for (const std::string_view known : members) all += (all.empty() ? "" : ", ") + std::string(known) + ".";
-      return bad_input("\"" + name + "\" is no parameter of a bone of this joint; begin with one of " + all);
+    const auto member = dot == std::string::npos ? found.members.end() : found.members.find(name.substr(0, dot));
+    if (member != found.members.end()) {
+      member->second[name.substr(dot + 1)] = value;
+      continue;
     }
-    member->second[name.substr(dot + 1)] = value;
+    // A bone that has such a parameter is the best example.
+    const std::string last = dot == std::string::npos ? name : name.substr(dot + 1);
+    auto like = std::ranges::find_if(
+        members, [&](const auto& one) { return std::ranges::find(one.names, last) != one.names.end(); });
+    const std::string example =
+        like != members.end() ? std::string(like->member) + "." + last
+                              : std::string(members.front().member) + "." + std::string(members.front().names.front());
+    std::string message = "\"" + name + "\" is no parameter of a " + std::string(kind) + "; write ";
+    for (const std::string_view known : own) message += std::string(known) + ", ";
+    return bad_input(message + "or a bone's parameter after its name, such as " + example);
   }
   return found;
+}
+
+Vec3 point_of(const PhantomBone& bone, std::string_view landmark) {
+  const std::vector<Landmark> landmarks = bone.anatomy().landmarks;
+  const auto found = std::ranges::find(landmarks, landmark, &Landmark::name);
+  OSTEON_CHECK(found != landmarks.end());
+  return found->point_mm;
+}
+
+std::vector<Vec3> line_of(const PhantomBone& bone, std::string_view structure) {
+  std::vector<Structure> structures = bone.structures();
+  const auto found = std::ranges::find(structures, structure, &Structure::name);
+  OSTEON_CHECK(found != structures.end() && !found->line_mm.empty());
+  return std::move(found->line_mm);
 }
 
 }  // namespace osteon::phantoms

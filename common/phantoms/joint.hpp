@@ -22,7 +22,7 @@ struct Cut {
 };
 
 struct JointMember {
-  std::string name;  // before its parameters, and of the bone if it has one only
+  std::string name;  // before its parameters, and before what has a name that another member has, too
   std::unique_ptr<PhantomBone> bone;
   Pose pose = {};  // from the bone's frame to that of the joint
   std::optional<Cut> cut = {};
@@ -33,8 +33,8 @@ struct JointMember {
 class Joint final : public PhantomBone {
  public:
   // At least one member; their names differ. `parameters` are those of the joint itself; a member's parameter has the
-  // member's name before it, such as femur.length_mm. So has a landmark, an axis or a structure whose name would occur
-  // twice: "femur, knee centre".
+  // member's name before it, such as femur.length_mm. So has a bone, a landmark, an axis, a plane or a structure whose
+  // name several members have, even beyond their cuts: "femur, knee centre".
   Joint(std::vector<JointMember> members, std::vector<NamedValue> parameters);
   Joint(const Joint&) = delete;  // its structures point to it
   Joint& operator=(const Joint&) = delete;
@@ -43,8 +43,8 @@ class Joint final : public PhantomBone {
 
   [[nodiscard]] std::vector<std::string> names() const override;
   [[nodiscard]] std::vector<NamedValue> parameters() const override;
-  // Landmarks beyond a cut are left out. An axis whose point lies beyond it begins where its line leaves the bone's
-  // cut, and is left out if that is nowhere beside the bone.
+  // Landmarks beyond a cut are left out, and planes never. An axis whose point lies beyond it begins where its line
+  // leaves the bone's cut, and is left out if that is nowhere beside the bone.
   [[nodiscard]] BoneAnatomy anatomy() const override;
   [[nodiscard]] Box bounds() const override;
   [[nodiscard]] BoneDepths depths(const Vec3& at_mm) const override { return find(at_mm).depths; }
@@ -84,15 +84,29 @@ struct JointChanges {
   std::map<std::string, double> own;
   std::map<std::string, std::map<std::string, double>, std::less<>> members;  // one for each name
 };
-// Error: invalid_input, naming the parameter that belongs to none of them.
-[[nodiscard]] Result<JointChanges> joint_changes(const std::map<std::string, double>& changes,
-                                                 std::span<const std::string_view> members);
+// A member and the names of its parameters.
+struct MemberParameters {
+  std::string_view member;
+  std::vector<std::string_view> names;
+};
+// `kind` is that of the joint, such as knee, and `own` the names of its own parameters. Error: invalid_input, naming
+// the parameter that is not among them and belongs to no member.
+[[nodiscard]] Result<JointChanges> joint_changes(std::string_view kind, const std::map<std::string, double>& changes,
+                                                 std::span<const std::string_view> own,
+                                                 std::span<const MemberParameters> members);
 
-// A member's parameters, with an error that begins with the member's name.
-template <class Parameters>
-[[nodiscard]] Result<Parameters> of_member(std::string_view member, Result<Parameters> parameters) {
-  if (parameters) return parameters;
-  return tl::unexpected(Error{parameters.error().code, std::string(member) + ": " + parameters.error().message});
+// What was found for a member. An error, which begins with a parameter's name, gets the member's name before it:
+// femur.shell_mm.
+template <class Found>
+[[nodiscard]] Result<Found> of_member(std::string_view member, Result<Found> found) {
+  if (found) return found;
+  std::string message = found.error().message;
+  message.insert(message.starts_with('"') ? 1 : 0, std::string(member) + ".");
+  return tl::unexpected(Error{found.error().code, std::move(message)});
 }
+
+// A landmark, and the line of a structure, that the bone has.
+[[nodiscard]] Vec3 point_of(const PhantomBone& bone, std::string_view landmark);
+[[nodiscard]] std::vector<Vec3> line_of(const PhantomBone& bone, std::string_view structure);
 
 }  // namespace osteon::phantoms

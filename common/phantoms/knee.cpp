@@ -18,7 +18,6 @@ namespace {
 constexpr double kTibiaForward = 0.12;  // of its plateau's middle before the condyles, as a part of its depth [A]
 constexpr double kLigamentEnd = 0.1;  // of the patellar ligament above the tuberosity's tip, of the plateau's width [A]
 constexpr double kApart_mm = 1.0;     // of any two bones, at least
-constexpr double kThinnestCartilage_mm = 0.5;
 constexpr double kSampleStep_mm = 2.0;  // of the patella's back
 
 using KneeField = ParameterField<KneeParameters>;
@@ -28,7 +27,6 @@ constexpr KneeField kKneeFields[] = {
     {"insall_salvati", &N::insall_salvati, 0.7, 1.6}, {"femur_cut_mm", &N::femur_cut_mm, 60.0, 160.0},
     {"tibia_cut_mm", &N::tibia_cut_mm, 60.0, 160.0},
 };
-constexpr std::string_view kKneeMembers[] = {"femur", "tibia", "patella"};
 
 struct KneeBones {
   KneeParameters knee;
@@ -37,24 +35,13 @@ struct KneeBones {
   PatellaParameters patella;
 };
 
-Result<void> check_gap(const char* name, double gap_mm, double cartilage_mm, double most, const char* of) {
-  if (gap_mm >= cartilage_mm - 1e-9) return {};
-  std::array<char, 240> text{};
-  std::snprintf(text.data(), text.size(),
-                "%s is %.4g, which does not fit cartilage_mm of %s; give a value from %.4g "
-                "to %.4g",
-                name, gap_mm, of, cartilage_mm, most);
-  return bad_input(text.data());
-}
-
 Result<KneeBones> knee_bones(const BoneRecipe& recipe) {
-  auto changes = joint_changes(recipe.changes, kKneeMembers);
+  const std::vector<std::string_view> names = names_of<KneeParameters>(kKneeFields);
+  const MemberParameters bones[] = {{"femur", names_of(femur_fields())},
+                                    {"tibia", names_of(tibia_fields())},
+                                    {"patella", names_of(patella_fields())}};
+  auto changes = joint_changes("knee", recipe.changes, names, bones);
   if (!changes) return tl::unexpected(changes.error());
-  for (const auto& [name, value] : changes->own)
-    if (std::ranges::find(kKneeFields, name, &KneeField::name) == std::end(kKneeFields))
-      return bad_input("\"" + name +
-                       "\" is no parameter of a knee; write one of joint_gap_mm, patella_gap_mm, insall_salvati, "
-                       "femur_cut_mm, tibia_cut_mm, or one of a bone after its name, such as femur.length_mm");
   KneeBones found;
   KneeParameters& k = found.knee;
   if (recipe.preset == "female" || recipe.preset == "small")
@@ -62,36 +49,32 @@ Result<KneeBones> knee_bones(const BoneRecipe& recipe) {
   if (auto changed = change<KneeParameters>(k, kKneeFields, changes->own); !changed)
     return tl::unexpected(changed.error());
 
-  // What a recipe does not say of cartilage follows from the gaps, which it fills.
-  const auto part_of = [&](std::string_view member, double cartilage_mm) {
+  // What a recipe does not say of cartilage follows from the gaps. It fills them as far as a bone's cartilage may.
+  const auto part_of = [&](std::string_view member, const auto& fields, double cartilage_mm) {
     std::map<std::string, double>& own = changes->members.find(member)->second;
-    own.emplace("cartilage_mm", std::max(kThinnestCartilage_mm, cartilage_mm));
+    const auto& field = field_of(fields, "cartilage_mm");
+    own.emplace("cartilage_mm", std::clamp(cartilage_mm, field.least, field.most));
     return BoneRecipe{std::string(member), recipe.side, recipe.preset, recipe.condition, own};
   };
-  auto femur = of_member("femur", femur_parameters(part_of("femur", 0.5 * k.joint_gap_mm)));
+  const double most_mm = k.patella_gap_mm - field_of(patella_fields(), "cartilage_mm").least;
+  const auto femur =
+      of_member("femur", femur_parameters(part_of("femur", femur_fields(), std::min(0.5 * k.joint_gap_mm, most_mm))));
   if (!femur) return tl::unexpected(femur.error());
-  auto tibia = of_member("tibia", tibia_parameters(part_of("tibia", k.joint_gap_mm - femur->cartilage_mm)));
+  const auto tibia =
+      of_member("tibia", tibia_parameters(part_of("tibia", tibia_fields(), k.joint_gap_mm - femur->cartilage_mm)));
   if (!tibia) return tl::unexpected(tibia.error());
-  auto patella = of_member("patella", patella_parameters(part_of("patella", k.patella_gap_mm - femur->cartilage_mm)));
+  const auto patella = of_member(
+      "patella", patella_parameters(part_of("patella", patella_fields(), k.patella_gap_mm - femur->cartilage_mm)));
   if (!patella) return tl::unexpected(patella.error());
-  if (auto fits =
-          check_gap("joint_gap_mm", k.joint_gap_mm, femur->cartilage_mm + tibia->cartilage_mm, 10.0, "femur and tibia");
-      !fits)
-    return tl::unexpected(fits.error());
-  if (auto fits = check_gap("patella_gap_mm", k.patella_gap_mm, femur->cartilage_mm + patella->cartilage_mm, 12.0,
-                            "femur and patella");
-      !fits)
-    return tl::unexpected(fits.error());
+  constexpr double kNoLimit = std::numeric_limits<double>::infinity();
+  const DependentLimit gaps[] = {
+      {"joint_gap_mm", femur->cartilage_mm + tibia->cartilage_mm, kNoLimit, "cartilage_mm of femur and tibia"},
+      {"patella_gap_mm", femur->cartilage_mm + patella->cartilage_mm, kNoLimit, "cartilage_mm of femur and patella"}};
+  if (auto fits = check_parameters<KneeParameters>(k, kKneeFields, gaps); !fits) return tl::unexpected(fits.error());
   found.femur = *femur;
   found.tibia = *tibia;
   found.patella = *patella;
   return found;
-}
-
-Vec3 landmark_of(const PhantomBone& bone, std::string_view name) {
-  for (const Landmark& landmark : bone.anatomy().landmarks)
-    if (landmark.name == name) return landmark.point_mm;
-  return Vec3::Zero();
 }
 
 // The plateau is the joint's gap away from both condyles, along its own normal.
@@ -99,7 +82,7 @@ Pose tibia_pose(const KneeBones& bones, const Femur& femur) {
   const double slope = bones.tibia.slope_degrees * std::numbers::pi / 180.0;
   const Vec3 normal(0.0, std::sin(slope), std::cos(slope));
   const double y = -kTibiaForward * bones.tibia.plateau_depth_mm;
-  const double reach = femur.condyles_reach_mm(normal) - bones.knee.joint_gap_mm;
+  const double reach = femur.lowest_along_mm(normal) - bones.knee.joint_gap_mm;
   Pose pose;
   pose.position_mm = {0.0, y, (reach - normal.y() * y) / normal.z()};
   return pose;
@@ -120,23 +103,35 @@ std::vector<Vec3> back_of(const Patella& patella, const PatellaParameters& p) {
   return points;
 }
 
-// Its ridge lies before the middle of the groove. From its apex to the end of the patellar ligament it is as far
-// as its own height times the ratio of Insall 1971. From there it comes back to its gap from the femur.
-Pose patella_pose(const KneeBones& bones, const Femur& femur, const Patella& patella, const Vec3& ligament_end) {
+// Its ridge lies before the middle of the groove. From the patella's apex to the end of its ligament it is as far as
+// the patella's height times the ratio of Insall 1971. In turns, the patella moves along z to that length and along y
+// to its gap from the femur, until both are as asked.
+Result<Pose> patella_pose(const KneeBones& bones, const Femur& femur, const Patella& patella,
+                          const Vec3& ligament_end) {
+  constexpr int kMostRounds = 100;
+  constexpr double kExact_mm = 1e-6, kGood_mm = 0.01;
   const std::vector<Vec3> back = back_of(patella, bones.patella);
-  const Vec3 apex = landmark_of(patella, "patellar apex");
+  const Vec3 apex = point_of(patella, "patellar apex");
   const double ligament = bones.knee.insall_salvati * bones.patella.height_mm;
   Pose pose;
-  pose.position_mm = {-landmark_of(patella, "patellar ridge").x(), -bones.femur.condyle_depth_mm, 0.0};
-  for (int round = 0; round < 30; ++round) {
-    const double forward = ligament_end.y() - pose.position_mm.y() - apex.y();
+  pose.position_mm = {-point_of(patella, "patellar ridge").x(), -bones.femur.condyle_depth_mm, 0.0};
+  double off_mm = std::numeric_limits<double>::infinity(), forward = 0.0;
+  for (int round = 0; round < kMostRounds && std::abs(off_mm) > kExact_mm; ++round) {
+    if (round > 0) pose.position_mm.y() += off_mm;
+    forward = ligament_end.y() - pose.position_mm.y() - apex.y();
     pose.position_mm.z() =
         ligament_end.z() - apex.z() + std::sqrt(std::max(0.0, ligament * ligament - forward * forward));
     double gap = std::numeric_limits<double>::infinity();
     for (const Vec3& at : back) gap = std::min(gap, femur.depths(pose.point(at)).surface_mm);
-    pose.position_mm.y() += gap - bones.knee.patella_gap_mm;
+    off_mm = gap - bones.knee.patella_gap_mm;
   }
-  return pose;
+  if (std::abs(off_mm) <= kGood_mm && ligament >= std::abs(forward)) return pose;
+  std::array<char, 200> text{};
+  std::snprintf(text.data(), text.size(),
+                "insall_salvati is %.4g, with which the patellar ligament does not reach a patella before the femur; "
+                "change it, patella_gap_mm or patella.height_mm",
+                bones.knee.insall_salvati);
+  return bad_input(text.data());
 }
 
 Result<void> check_knee_apart(const Joint& knee, const KneeParameters& p) {
@@ -146,19 +141,13 @@ Result<void> check_knee_apart(const Joint& knee, const KneeParameters& p) {
   const char* name = !patella ? "joint_gap_mm" : found->first == "femur" ? "patella_gap_mm" : "insall_salvati";
   const double value = !patella ? p.joint_gap_mm : found->first == "femur" ? p.patella_gap_mm : p.insall_salvati;
   std::array<char, 240> text{};
-  std::snprintf(text.data(), text.size(), "%s is %.4g, with which %s and %s touch; give a larger value", name, value,
-                found->first.c_str(), found->second.c_str());
+  std::snprintf(text.data(), text.size(),
+                "%s is %.4g, with which %s and %s come nearer than %g mm to each other; give a larger value", name,
+                value, found->first.c_str(), found->second.c_str(), kApart_mm);
   return bad_input(text.data());
 }
 
-std::vector<Vec3> line_of(const PhantomBone& bone, std::string_view name) {
-  for (Structure& structure : bone.structures())
-    if (structure.name == name) return std::move(structure.line_mm);
-  return {};
-}
-
-// Of structures that go on from one bone to the next: from where they come behind the femur to where they leave the
-// knee, between both cuts.
+// Where vessels and nerves enter and leave a knee.
 struct Passage {
   Vec3 hiatus, sciatic, anterior_tibial;  // ends of the femur's lines, and the begin of the tibia's
   Vec3 plateau;                           // its middle
@@ -206,18 +195,19 @@ Result<std::unique_ptr<PhantomBone>> make_knee(const BoneRecipe& recipe) {
   auto patella = std::make_unique<Patella>(bones->patella, recipe.side);
   const Pose below = tibia_pose(*bones, *femur);
   const Vec3 ligament_end =
-      landmark_of(*tibia, "tibial tuberosity") + kLigamentEnd * bones->tibia.plateau_width_mm * Vec3::UnitZ();
-  const Pose before = patella_pose(*bones, *femur, *patella, below.point(ligament_end));
+      point_of(*tibia, "tibial tuberosity") + kLigamentEnd * bones->tibia.plateau_width_mm * Vec3::UnitZ();
+  const auto before = patella_pose(*bones, *femur, *patella, below.point(ligament_end));
+  if (!before) return tl::unexpected(before.error());
   const Passage passage{line_of(*femur, "femoral artery").back(),
                         line_of(*femur, "sciatic nerve").back(),
                         below.point(line_of(*tibia, "anterior tibial artery").front()),
                         below.position_mm,
                         below.position_mm.z() - p.tibia_cut_mm,
-                        femur->condyles_reach_mm(Vec3::UnitZ()) + p.femur_cut_mm};
+                        femur->lowest_along_mm(Vec3::UnitZ()) + p.femur_cut_mm};
   std::vector<JointMember> members;
   members.push_back({"femur", std::move(femur), {}, Cut{{0.0, 0.0, passage.highest_z}, Vec3::UnitZ()}});
   members.push_back({"tibia", std::move(tibia), below, Cut{{0.0, 0.0, -p.tibia_cut_mm}, -Vec3::UnitZ()}});
-  members.push_back({"patella", std::move(patella), before});
+  members.push_back({"patella", std::move(patella), *before});
   auto knee = std::make_unique<Joint>(std::move(members), values_of<KneeParameters>(p, kKneeFields));
   if (auto apart = check_knee_apart(*knee, p); !apart) return tl::unexpected(apart.error());
   knee->set_structures(knee_structures(*knee, passage));

@@ -1,7 +1,6 @@
 #include "common/phantoms/patella.hpp"
 
 #include <cmath>
-#include <cstdio>
 #include <limits>
 #include <numbers>
 
@@ -68,39 +67,22 @@ double rim_mm(const PatellaParameters& p) {
   return std::min({thickness_at(p, 0.0, -h), thickness_at(p, 0.0, h), thickness_at(p, -w, z), thickness_at(p, w, z)});
 }
 
-std::string patella_limits(const char* name, double value, double least, double most, const char* others) {
-  std::array<char, 240> text{};
-  std::snprintf(text.data(), text.size(), "%s is %.4g, which does not fit %s; give a value from %.4g to %.4g", name,
-                value, others, least, most);
-  return text.data();
-}
-
 }  // namespace
 
 std::span<const ParameterField<PatellaParameters>> patella_fields() { return kPatellaFields; }
 
 Result<void> check_patella(const PatellaParameters& p) {
-  for (const PatellaField& field : kPatellaFields)
-    if (const double value = p.*field.value; !(value >= field.least && value <= field.most))
-      return bad_parameter(field.name, value, field.least, field.most);
-  struct Row {
-    const char* name;
-    double value, least, most;
-    const char* others;
-  };
+  constexpr double kNoLimit = std::numeric_limits<double>::infinity();
   // As much thicker as the thinnest part of the rim is too thin.
   const double thickness_mm = (p.thickness_mm - rim_mm(p)) / (1.0 - kThinnestRim);
-  const Row rows[] = {
-      {"width_mm", p.width_mm, 0.75 * p.height_mm, 1.35 * p.height_mm, "height_mm"},
-      {"ridge_mm", p.ridge_mm, 0.0, 0.15 * p.width_mm, "width_mm"},
-      {"thickness_mm", p.thickness_mm, thickness_mm, 0.8 * std::min(p.height_mm, p.width_mm),
+  const DependentLimit limits[] = {
+      {"width_mm", 0.75 * p.height_mm, 1.35 * p.height_mm, "height_mm"},
+      {"ridge_mm", -kNoLimit, 0.15 * p.width_mm, "width_mm"},
+      {"thickness_mm", thickness_mm, 0.8 * std::min(p.height_mm, p.width_mm),
        "height_mm, width_mm, ridge_mm and facets_degrees"},
-      {"shell_mm", p.shell_mm, 0.0, 0.15 * p.thickness_mm, "thickness_mm"},
+      {"shell_mm", -kNoLimit, 0.15 * p.thickness_mm, "thickness_mm"},
   };
-  for (const Row& row : rows)
-    if (!(row.value >= row.least && row.value <= row.most))
-      return bad_input(patella_limits(row.name, row.value, row.least, row.most, row.others));
-  return {};
+  return check_parameters<PatellaParameters>(p, kPatellaFields, limits);
 }
 
 Result<PatellaParameters> patella_parameters(const BoneRecipe& recipe) {

@@ -1,7 +1,6 @@
 #include "common/phantoms/pelvis.hpp"
 
 #include <cmath>
-#include <cstdio>
 #include <limits>
 #include <numbers>
 
@@ -127,14 +126,6 @@ LowerHip lower_hip(const PelvisParameters& p) {
   return at;
 }
 
-Result<void> fits_beside(const char* name, double value, double least, double most, const char* others) {
-  if (value >= least && value <= most) return {};
-  std::array<char, 240> text{};
-  std::snprintf(text.data(), text.size(), "%s is %.4g, which does not fit %s; give a value from %.4g to %.4g", name,
-                value, others, least, most);
-  return bad_input(text.data());
-}
-
 double slope_of(const Profile& curve, double x) {
   constexpr double kStep = 0.5;
   return (curve(x + kStep) - curve(x - kStep)) / (2.0 * kStep);
@@ -154,53 +145,40 @@ double joint_x_at(const PelvisParameters& p, double y, double z) {
 std::span<const ParameterField<PelvisParameters>> pelvis_fields() { return kPelvisFields; }
 
 Result<void> check_pelvis(const PelvisParameters& p) {
-  for (const PelvisField& field : kPelvisFields)
-    if (const double value = p.*field.value; !(value >= field.least && value <= field.most))
-      return bad_parameter(field.name, value, field.least, field.most);
+  constexpr double kNoLimit = std::numeric_limits<double>::infinity();
   const double hips = p.hip_centres_mm, u = hips / 180.0, r = 0.5 * p.acetabulum_diameter_mm;
   const double joint_mm =
       joint_x_at(p, kIliacSpineSize * hips - p.posterior_spine_back_mm, p.posterior_spine_height_mm);
   const LowerHip at = lower_hip(p);
   const double wide_mm = (at.beside() - at.medial()).norm() - 18.0 * u,
                high_mm = (at.ramus - at.below()).norm() - 9.0 * u;
-  struct Row {
-    const char* name;
-    double value, least, most;
-    const char* others;
-  };
-  const Row rows[] = {
-      {"acetabulum_diameter_mm", p.acetabulum_diameter_mm, 0.23 * hips, 0.34 * hips, "hip_centres_mm"},
-      {"plane_forward_mm", p.plane_forward_mm, 0.17 * hips, 0.29 * hips, "hip_centres_mm"},
-      {"spines_mm", p.spines_mm, 1.15 * hips, 1.55 * hips, "hip_centres_mm"},
-      {"spine_height_mm", p.spine_height_mm, r + 32.0 * u, r + 65.0 * u, "acetabulum_diameter_mm and hip_centres_mm"},
-      {"crests_mm", p.crests_mm, p.spines_mm + 20.0 * u, p.spines_mm + 70.0 * u, "spines_mm"},
-      {"posterior_spine_back_mm", p.posterior_spine_back_mm, 0.52 * hips, 0.74 * hips, "hip_centres_mm"},
-      {"posterior_spine_height_mm", p.posterior_spine_height_mm, 0.40 * hips, 0.60 * hips, "hip_centres_mm"},
-      {"posterior_spines_mm", p.posterior_spines_mm, 2.0 * joint_mm + 9.0 * u, 2.0 * joint_mm + 40.0 * u,
+  const DependentLimit limits[] = {
+      {"acetabulum_diameter_mm", 0.23 * hips, 0.34 * hips, "hip_centres_mm"},
+      {"plane_forward_mm", 0.17 * hips, 0.29 * hips, "hip_centres_mm"},
+      {"spines_mm", 1.15 * hips, 1.55 * hips, "hip_centres_mm"},
+      {"spine_height_mm", r + 32.0 * u, r + 65.0 * u, "acetabulum_diameter_mm and hip_centres_mm"},
+      {"crests_mm", p.spines_mm + 20.0 * u, p.spines_mm + 70.0 * u, "spines_mm"},
+      {"posterior_spine_back_mm", 0.52 * hips, 0.74 * hips, "hip_centres_mm"},
+      {"posterior_spine_height_mm", 0.40 * hips, 0.60 * hips, "hip_centres_mm"},
+      {"posterior_spines_mm", 2.0 * joint_mm + 9.0 * u, 2.0 * joint_mm + 40.0 * u,
        "sacrum_width_mm and posterior_spine_back_mm"},
-      {"crest_height_mm", p.crest_height_mm,
-       std::max(p.spine_height_mm + 40.0 * u, p.posterior_spine_height_mm + 25.0 * u), p.spine_height_mm + 90.0 * u,
-       "spine_height_mm and posterior_spine_height_mm"},
-      {"crest_mm", p.crest_mm, p.wing_mm + 2.0, 3.0 * p.wing_mm, "wing_mm"},
-      {"shell_mm", p.shell_mm, 0.0, 0.36 * p.wing_mm, "wing_mm"},
-      {"subchondral_mm", p.subchondral_mm, 0.0, 0.7 * kWall * r, "acetabulum_diameter_mm"},
-      {"tubercles_mm", p.tubercles_mm, 0.25 * hips, 0.42 * hips, "hip_centres_mm"},
-      {"tubercle_depth_mm", p.tubercle_depth_mm, 0.03 * hips, 0.17 * hips, "hip_centres_mm"},
-      {"symphysis_mm", p.symphysis_mm, 0.17 * hips, 0.26 * hips, "hip_centres_mm"},
-      {"tuberosities_mm", p.tuberosities_mm, 0.52 * hips, 0.82 * hips, "hip_centres_mm"},
-      {"tuberosity_depth_mm", p.tuberosity_depth_mm, r + 54.0 * u, r + 78.0 * u,
-       "acetabulum_diameter_mm and hip_centres_mm"},
-      {"tuberosity_back_mm", p.tuberosity_back_mm, 0.08 * hips, 0.24 * hips, "hip_centres_mm"},
-      {"foramen_width_mm", p.foramen_width_mm, 0.5 * wide_mm, wide_mm,
-       "tubercles_mm, tuberosities_mm and plane_forward_mm"},
-      {"foramen_height_mm", p.foramen_height_mm, 0.5 * high_mm, high_mm,
-       "tubercle_depth_mm, tuberosity_depth_mm and symphysis_mm"},
-      {"sacrum_width_mm", p.sacrum_width_mm, 0.52 * hips, 0.70 * hips, "hip_centres_mm"},
-      {"sacrum_height_mm", p.sacrum_height_mm, 0.50 * hips, 0.75 * hips, "hip_centres_mm"},
+      {"crest_height_mm", std::max(p.spine_height_mm + 40.0 * u, p.posterior_spine_height_mm + 25.0 * u),
+       p.spine_height_mm + 90.0 * u, "spine_height_mm and posterior_spine_height_mm"},
+      {"crest_mm", p.wing_mm + 2.0, 3.0 * p.wing_mm, "wing_mm"},
+      {"shell_mm", -kNoLimit, 0.36 * p.wing_mm, "wing_mm"},
+      {"subchondral_mm", -kNoLimit, 0.7 * kWall * r, "acetabulum_diameter_mm"},
+      {"tubercles_mm", 0.25 * hips, 0.42 * hips, "hip_centres_mm"},
+      {"tubercle_depth_mm", 0.03 * hips, 0.17 * hips, "hip_centres_mm"},
+      {"symphysis_mm", 0.17 * hips, 0.26 * hips, "hip_centres_mm"},
+      {"tuberosities_mm", 0.52 * hips, 0.82 * hips, "hip_centres_mm"},
+      {"tuberosity_depth_mm", r + 54.0 * u, r + 78.0 * u, "acetabulum_diameter_mm and hip_centres_mm"},
+      {"tuberosity_back_mm", 0.08 * hips, 0.24 * hips, "hip_centres_mm"},
+      {"foramen_width_mm", 0.5 * wide_mm, wide_mm, "tubercles_mm, tuberosities_mm and plane_forward_mm"},
+      {"foramen_height_mm", 0.5 * high_mm, high_mm, "tubercle_depth_mm, tuberosity_depth_mm and symphysis_mm"},
+      {"sacrum_width_mm", 0.52 * hips, 0.70 * hips, "hip_centres_mm"},
+      {"sacrum_height_mm", 0.50 * hips, 0.75 * hips, "hip_centres_mm"},
   };
-  for (const Row& row : rows)
-    if (auto fits = fits_beside(row.name, row.value, row.least, row.most, row.others); !fits) return fits;
-  return {};
+  return check_parameters<PelvisParameters>(p, kPelvisFields, limits);
 }
 
 Result<PelvisParameters> pelvis_parameters(const BoneRecipe& recipe) {
@@ -424,7 +402,8 @@ double Pelvis::wing_mm(const Vec3& at) const {
   const double thick = 0.5 * p_.wing_mm + 0.5 * (p_.crest_mm - p_.wing_mm) * smooth_step(edge, -18.0 * unit_mm_, -3.0);
   const double across = std::abs(u - low - s * (high - low)) / std::sqrt(1.0 + rise * rise + run * run);
   double d = smooth_max(across - thick, edge, kWingEdge);
-  d = smooth_max(d, front_(z) - v, kWingEdge);
+  const double lean = slope_of(front_, z);
+  d = smooth_max(d, (front_(z) - v) / std::sqrt(1.0 + lean * lean), kWingEdge);
   d = smooth_max(d, v - chord_mm_ + 1.0, kWingEdge);
   return smooth_max(d, bottom - z, kWingEdge);
 }
@@ -465,7 +444,7 @@ double Pelvis::pubis_mm(const Vec3& at) const {
 }
 
 double Pelvis::hip_mm(const Vec3& at) const {
-  // A half that is far away is not asked.
+  // Skip the half that is too far away to change the result.
   const double blend = kIliumBlend * unit_mm_;
   double d = 0.0;
   if (at.z() > 0.0) {
@@ -545,8 +524,9 @@ BoneDepths Pelvis::depths(const Vec3& at_mm) const {
     depths.cortex_mm = std::max(hip + p_.shell_mm, p_.subchondral_mm - socket_mm(at));
     return depths;
   }
+  // Skip the sacrum where it is too far away to change the result.
   const double around = (at - sacrum_middle_).norm() - sacrum_reach_mm_;
-  const double sacrum = around < hip ? sacrum_mm(at) : around;  // it is not asked where it is farther
+  const double sacrum = around < hip ? sacrum_mm(at) : around;
   depths.bone = sacrum < hip ? 3 : at_mm.x() >= 0.0 ? 1 : 2;
   depths.surface_mm = std::min(hip, sacrum);
   depths.cortex_mm = depths.surface_mm + p_.shell_mm;

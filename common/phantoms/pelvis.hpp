@@ -59,9 +59,9 @@ class Pelvis final : public PhantomBone {
  private:
   // Two balls and their hull, which grows together with what is there.
   struct Limb {
-    Vec3 a;
+    Vec3 a = Vec3::Zero();
     double radius_a_mm = 0.0;
-    Vec3 b;
+    Vec3 b = Vec3::Zero();
     double radius_b_mm = 0.0;
     double blend_mm = 0.0;
     // A ball around it.

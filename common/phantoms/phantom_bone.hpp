@@ -43,6 +43,9 @@ struct BoneDepths {
   double marrow_mm = 0.0;   // the end of marrow, negative in the canal
   int bone = 1;             // number of the nearest bone, from 1
 };
+// How fast BoneDepths::surface_mm grows at most beside the surface, mm per mm. Everywhere, the surface is at least as
+// far as surface_mm says, divided by this.
+inline constexpr double kSteepest = 2.0;
 
 [[nodiscard]] BoneTissue tissue_of(const BoneDepths& depths);
 

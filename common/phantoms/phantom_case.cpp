@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <limits>
 
+#include "common/core/check.hpp"
 #include "common/volume/narrow_band.hpp"
 
 namespace osteon::phantoms {
@@ -13,9 +14,7 @@ namespace {
 
 constexpr double kMostSamples = 5e8;
 constexpr double kCoarsest_mm = 2.0;
-constexpr int kBand = 5;  // samples around the bone
-// How fast a distance of a phantom bone may grow at most, mm per mm.
-constexpr double kSteepest = 1.6;
+constexpr int kBand = 5;                              // samples around the bone
 constexpr double kScanEnd = 0.35, kSurfaceEnd = 0.7;  // of the whole work
 
 constexpr std::array kTissueNames{"cortical", "cancellous", "marrow"};
@@ -27,6 +26,13 @@ Result<void> check_pitch(const CoordBox& box, double pitch_mm) {
   std::array<char, 160> text{};
   std::snprintf(text.data(), text.size(), "a pitch of %g mm does not fit this bone; give a --pitch from %.2g to %g",
                 pitch_mm, std::max(0.02, pitch_mm * std::cbrt(samples / kMostSamples)), kCoarsest_mm);
+  return bad_input(text.data());
+}
+
+tl::unexpected<Error> no_voxel(double pitch_mm) {
+  std::array<char, 120> text{};
+  std::snprintf(text.data(), text.size(), "no voxel of a pitch of %g mm is in this bone; give a smaller --pitch",
+                pitch_mm);
   return bad_input(text.data());
 }
 
@@ -122,6 +128,7 @@ Result<CaseScan> scan_of(const PhantomBone& bone, const std::vector<Structure>& 
   };
   const auto soft = static_cast<std::int16_t>(std::lround(options.hu.second));
   const int first_structure = static_cast<int>(kTissueNames.size() * bone.names().size()) + 1;
+  OSTEON_CHECK(first_structure + structures.size() <= 1 + std::numeric_limits<std::uint8_t>::max());
   for (int z = box.min.z; z <= box.max.z; ++z) {
     if (!keep_going(static_cast<double>(z - box.min.z) / dims.z)) return stopped_while("labelling the phantom");
     for (int y = box.min.y; y <= box.max.y; ++y) {
@@ -164,6 +171,8 @@ Result<PhantomCase> build_phantom_case(const PhantomBone& bone, const PhantomCas
   if (auto fits = check_pitch(box, pitch_mm); !fits) return tl::unexpected(fits.error());
   auto scan = scan_of(bone, structures, options, box, part(keep_going, 0.0, kScanEnd));
   if (!scan) return tl::unexpected(scan.error());
+  if (std::ranges::none_of(scan->labels.values(), [](std::uint8_t value) { return value != 0; }))
+    return no_voxel(pitch_mm);
   const auto described = describe_scan(*scan);
   if (!described) return tl::unexpected(described.error());
   const auto surface = surface_of(bone, box, pitch_mm, part(keep_going, kScanEnd, kSurfaceEnd));

@@ -22,11 +22,11 @@ Box box_around(const std::vector<Vec3>& points, double radius_mm) {
   return box.grown(radius_mm);
 }
 
-// How far from a point along a way the line is clear of bone, from there on to far away.
+// How far from a point along its direction the line is clear of bone, from there on to far away.
 double clear_from(const Beside& beside, const Distance& bone_mm) {
   double t = kFar_mm;
   for (int step = 0; step < 400; ++step) {
-    const double free_mm = bone_mm(beside.point_mm + t * beside.way) - beside.clear_mm;
+    const double free_mm = bone_mm(beside.point_mm + t * beside.direction) - beside.clear_mm;
     if (free_mm < 0.05) return t;
     t -= std::max(0.05, kSlowest * free_mm);
     if (t <= 0.0) return 0.0;
@@ -109,13 +109,13 @@ std::vector<Vec3> line_beside(const std::vector<Beside>& points, double span_mm,
     const int parts = std::max(1, static_cast<int>(std::ceil((b.point_mm - a.point_mm).norm() / kLineStep_mm)));
     for (int k = i == 0 ? 0 : 1; k <= parts; ++k) {
       const double t = static_cast<double>(k) / parts;
-      fine.push_back({(1.0 - t) * a.point_mm + t * b.point_mm, ((1.0 - t) * a.way + t * b.way).normalized(),
+      fine.push_back({(1.0 - t) * a.point_mm + t * b.point_mm, ((1.0 - t) * a.direction + t * b.direction).normalized(),
                       (1.0 - t) * a.clear_mm + t * b.clear_mm});
     }
   }
   std::vector<double> away;
   for (const Beside& beside : fine) away.push_back(clear_from(beside, bone_mm));
-  // The mean of the largest ones around is nowhere less than what is needed there.
+  // Each value becomes the largest one around, and then their mean, which is at least the value at that place.
   const auto reach = static_cast<std::size_t>(std::lround(0.5 * span_mm / kLineStep_mm));
   away = windowed(away, reach, [](auto from, auto to) { return *std::max_element(from, to); });
   away = windowed(away, reach, [](auto from, auto to) {
@@ -124,7 +124,7 @@ std::vector<Vec3> line_beside(const std::vector<Beside>& points, double span_mm,
     return sum / static_cast<double>(to - from);
   });
   std::vector<Vec3> line;
-  for (std::size_t i = 0; i < fine.size(); ++i) line.emplace_back(fine[i].point_mm + away[i] * fine[i].way);
+  for (std::size_t i = 0; i < fine.size(); ++i) line.emplace_back(fine[i].point_mm + away[i] * fine[i].direction);
   return line;
 }
 
@@ -143,14 +143,14 @@ std::vector<Vec3> rounded(const std::vector<Vec3>& line) {
   return fine;
 }
 
-Vec3 surface_from(const Vec3& inside, const Vec3& way, const Distance& bone_mm) {
+Vec3 surface_from(const Vec3& inside, const Vec3& direction, const Distance& bone_mm) {
   double t = 0.0;
   for (int step = 0; step < 400 && t < kFar_mm; ++step) {
-    const double deep_mm = -bone_mm(inside + t * way);
+    const double deep_mm = -bone_mm(inside + t * direction);
     if (deep_mm < 0.01) break;
     t += std::max(0.01, kSlowest * deep_mm);
   }
-  return inside + t * way;
+  return inside + t * direction;
 }
 
 }  // namespace osteon::phantoms

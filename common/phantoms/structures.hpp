@@ -27,10 +27,11 @@ inline constexpr double kFootprint_mm = 1.5;  // thickness of a footprint
 [[nodiscard]] Structure footprint(const std::string& name, const Vec3& centre, double radius_mm,
                                   const Distance& bone_mm);
 
-// A point beside which a line passes, and the way in which it lies from there. The line is `clear_mm` off bone.
+// A point beside which a line passes, and the direction in which it lies from there, a unit vector. The line is
+// `clear_mm` off bone.
 struct Beside {
   Vec3 point_mm = Vec3::Zero();
-  Vec3 way = Vec3::UnitY();
+  Vec3 direction = Vec3::UnitY();
   double clear_mm = 0.0;
 };
 // A smooth line that passes beside all points in order and keeps clear of bone, as a vessel does that spans hollows.
@@ -41,6 +42,6 @@ struct Beside {
 [[nodiscard]] std::vector<Vec3> rounded(const std::vector<Vec3>& line);
 
 // The first point of the surface from a point in bone along a unit vector.
-[[nodiscard]] Vec3 surface_from(const Vec3& inside, const Vec3& way, const Distance& bone_mm);
+[[nodiscard]] Vec3 surface_from(const Vec3& inside, const Vec3& direction, const Distance& bone_mm);
 
 }  // namespace osteon::phantoms

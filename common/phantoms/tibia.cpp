@@ -1,7 +1,7 @@
 #include "common/phantoms/tibia.hpp"
 
 #include <cmath>
-#include <cstdio>
+#include <limits>
 #include <numbers>
 
 #include "common/phantoms/structures.hpp"
@@ -87,40 +87,24 @@ TibiaParameters tibia_preset(std::string_view name) {
   return p;
 }
 
-std::string limits(const char* name, double value, double least, double most, const char* others) {
-  std::array<char, 240> text{};
-  std::snprintf(text.data(), text.size(), "%s is %.4g, which does not fit %s; give a value from %.4g to %.4g", name,
-                value, others, least, most);
-  return text.data();
-}
-
 }  // namespace
 
 std::span<const ParameterField<TibiaParameters>> tibia_fields() { return kTibiaFields; }
 
 Result<void> check_tibia(const TibiaParameters& p) {
-  for (const TibiaField& field : kTibiaFields)
-    if (const double value = p.*field.value; !(value >= field.least && value <= field.most))
-      return bad_parameter(field.name, value, field.least, field.most);
+  constexpr double kNoLimit = std::numeric_limits<double>::infinity();
+  std::vector<DependentLimit> limits;
   for (const TibiaStation& s : kTibiaRows)
-    if (const double most = 0.38 * std::min(p.*s.width, p.*s.depth); p.*s.cortex > most)
-      return bad_input(limits(s.name, p.*s.cortex, 0.0, most, "the shaft's width and depth there"));
-  struct Row {
-    const char* name;
-    double value, least, most;
-    const char* others;
+    limits.push_back({s.name, -kNoLimit, 0.38 * std::min(p.*s.width, p.*s.depth), "the shaft's width and depth there"});
+  const DependentLimit others[] = {
+      {"width_86_mm", 0.4 * p.plateau_width_mm, 0.85 * p.plateau_width_mm, "plateau_width_mm"},
+      {"depth_86_mm", 0.5 * p.plateau_depth_mm, p.plateau_depth_mm, "plateau_depth_mm"},
+      {"fibula_length_mm", 0.94 * p.length_mm, 1.02 * p.length_mm, "length_mm"},
+      {"fibula_cortex_mm", -kNoLimit, 0.42 * p.fibula_width_mm, "fibula_width_mm"},
+      {"fibula_head_mm", 1.2 * p.fibula_width_mm, 2.6 * p.fibula_width_mm, "fibula_width_mm"},
   };
-  const Row rows[] = {
-      {"width_86_mm", p.width_86_mm, 0.4 * p.plateau_width_mm, 0.85 * p.plateau_width_mm, "plateau_width_mm"},
-      {"depth_86_mm", p.depth_86_mm, 0.5 * p.plateau_depth_mm, p.plateau_depth_mm, "plateau_depth_mm"},
-      {"fibula_length_mm", p.fibula_length_mm, 0.94 * p.length_mm, 1.02 * p.length_mm, "length_mm"},
-      {"fibula_cortex_mm", p.fibula_cortex_mm, 0.0, 0.42 * p.fibula_width_mm, "fibula_width_mm"},
-      {"fibula_head_mm", p.fibula_head_mm, 1.2 * p.fibula_width_mm, 2.6 * p.fibula_width_mm, "fibula_width_mm"},
-  };
-  for (const Row& row : rows)
-    if (!(row.value >= row.least && row.value <= row.most))
-      return bad_input(limits(row.name, row.value, row.least, row.most, row.others));
-  return {};
+  limits.insert(limits.end(), std::begin(others), std::end(others));
+  return check_parameters<TibiaParameters>(p, kTibiaFields, limits);
 }
 
 Result<TibiaParameters> tibia_parameters(const BoneRecipe& recipe) {
@@ -255,9 +239,9 @@ BoneAnatomy Tibia::anatomy() const {
 
 Vec3 Tibia::between_bones(double z) const {
   const Vec3 middle(0.0, 0.0, z), fibula = fibula_centre(z), apart = fibula - middle;
-  const Vec3 way = Vec3(apart.x(), apart.y(), 0.0).normalized();
-  const double tibia = surface_from(middle, way, [this](const Vec3& at) { return tibia_mm(at); }).dot(way);
-  return middle + 0.5 * (tibia + apart.norm() - fibula_radius_(z)) * way;
+  const Vec3 across = Vec3(apart.x(), apart.y(), 0.0).normalized();
+  const double tibia = surface_from(middle, across, [this](const Vec3& at) { return tibia_mm(at); }).dot(across);
+  return middle + 0.5 * (tibia + apart.norm() - fibula_radius_(z)) * across;
 }
 
 double Tibia::joint_face_mm(const Vec3& at) const {
@@ -305,8 +289,8 @@ std::vector<Structure> Tibia::structures() const {
     anterior.push_back(world(between_bones(-part * l) + forward_mm * Vec3::UnitY()));
   popliteal.push_back(anterior.front());
   // The common peroneal nerve winds around the fibula's neck, from behind its head to the front.
-  const auto beside_neck = [&](double heads_down, const Vec3& way, double clear_mm) {
-    return Beside{fibula_centre(fibula_head_.z() - heads_down * head), way, clear_mm};
+  const auto beside_neck = [&](double heads_down, const Vec3& direction, double clear_mm) {
+    return Beside{fibula_centre(fibula_head_.z() - heads_down * head), direction, clear_mm};
   };
   std::vector<Vec3> peroneal = line({beside_neck(0.0, {0.1, -1.0, 0.0}, 7.0), beside_neck(0.5, {0.6, -0.8, 0.0}, 5.0),
                                      beside_neck(0.9, {1.0, -0.1, 0.0}, 4.0), beside_neck(1.3, {0.85, 0.5, 0.0}, 4.0)},

@@ -16,7 +16,7 @@ namespace {
 
 TEST(Hip, HeadAndAcetabulumHaveOneCentreAndTheGapBetweenThem) {
   const auto hip = bone_of({.kind = "hip"});
-  ASSERT_EQ(hip->names(), (std::vector<std::string>{"pelvis", "femur"}));
+  ASSERT_EQ(hip->names(), (std::vector<std::string>{"hip bone", "femur"}));
   const Vec3 centre = landmark(*hip, "acetabular centre");
   EXPECT_NEAR((landmark(*hip, "head centre") - centre).norm(), 0.0, 1e-9);
   EXPECT_GT(centre.x(), 0.0);  // the left one, in LPS
@@ -102,11 +102,24 @@ TEST(Hip, RecipesThatDoNotFitAreOneSentence) {
   };
   refused("shaft_mm", 500.0, "give a value from 20 to 150");
   refused("femur.head_diameter_mm", 51.5, "pelvis.acetabulum_diameter_mm; give a value from 44 to 50");
-  refused("femur.neck_shaft_degrees", 170.0, "femur: ");
-  refused("pelvis.inclination_degrees", 80.0, "pelvis: ");
+  refused("femur.neck_shaft_degrees", 170.0, "femur.neck_shaft_degrees is 170; give a value");
+  refused("pelvis.inclination_degrees", 80.0, "pelvis.inclination_degrees is 80; give a value");
   refused("pelvis.cartilage_mm", 3.5, "at most the gap between head and acetabulum");
-  refused("patella.width_mm", 40.0, "femur.");
-  refused("slope_degrees", 7.0, "shaft_mm");
+  refused("patella.width_mm", 40.0, "is no parameter of a hip; write shaft_mm, or a bone's parameter after its name");
+  refused("neck_shaft_degrees", 120.0,
+          "is no parameter of a hip; write shaft_mm, or a bone's parameter after its name, "
+          "such as femur.neck_shaft_degrees");
+}
+
+// Each parameter of the hip at the ends of its range: made, or refused by a sentence that names it.
+TEST(Hip, EndsOfRangesAreMadeOrNamed) {
+  for (const std::string_view preset : kPresets)
+    for (const auto& field : hip_fields())
+      for (const double value : {field.least, field.most}) {
+        const std::string name(field.name);
+        const auto made = make_bone({.kind = "hip", .preset = std::string(preset), .changes = {{name, value}}});
+        EXPECT_TRUE(made || made.error().message.starts_with(name + " is ")) << preset << ": " << made.error().message;
+      }
 }
 
 }  // namespace

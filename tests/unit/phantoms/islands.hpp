@@ -39,8 +39,8 @@ namespace osteon::phantoms {
   return islands;
 }
 
-// Pieces of each bone on a coarse lattice around the phantom. All are closed: no solid sample is at the lattice's end,
-// or there are none.
+// Pieces of each bone on a coarse lattice around the phantom. Empty if a solid sample lies at the lattice's end,
+// because then the bone is not closed.
 [[nodiscard]] inline std::vector<int> islands_of(const PhantomBone& bone, double pitch_mm) {
   const CoordBox box = covering_samples(bone.bounds(), pitch_mm);
   const std::size_t bones = bone.names().size();

@@ -63,7 +63,7 @@ TEST(Joint, IsTheNearerOfItsBonesAndNumbersThemThroughAllMembers) {
   Pose below = some_pose();
   below.position_mm.z() = -150.0;
   const Joint joint = joint_of(member("upper", "femur"), member("lower", "tibia", below));
-  EXPECT_EQ(joint.names(), (std::vector<std::string>{"upper", "tibia", "fibula"}));
+  EXPECT_EQ(joint.names(), (std::vector<std::string>{"femur", "tibia", "fibula"}));
   const auto femur = bone_of({}), tibia = bone_of({.kind = "tibia"});
   test::Random random(6);
   std::set<int> numbers;
@@ -160,16 +160,44 @@ TEST(Joint, ParametersHaveTheNameOfTheirBone) {
 }
 
 TEST(Joint, ChangesGoToTheirMembers) {
-  constexpr std::string_view kMembers[] = {"femur", "tibia"};
-  const auto found = joint_changes({{"gap_mm", 5.0}, {"femur.length_mm", 400.0}}, kMembers);
+  constexpr std::string_view kOwn[] = {"gap_mm", "cut_mm"};
+  const MemberParameters members[] = {{"femur", {"length_mm", "offset_mm"}}, {"tibia", {"length_mm", "slope_degrees"}}};
+  const auto found = joint_changes("knee", {{"gap_mm", 5.0}, {"femur.length_mm", 400.0}}, kOwn, members);
   ASSERT_TRUE(found) << found.error().message;
   EXPECT_EQ(found->own, (std::map<std::string, double>{{"gap_mm", 5.0}}));
   EXPECT_EQ(found->members.at("femur"), (std::map<std::string, double>{{"length_mm", 400.0}}));
   EXPECT_TRUE(found->members.at("tibia").empty());
-  const auto wrong = joint_changes({{"wing.length_mm", 1.0}}, kMembers);
-  ASSERT_FALSE(wrong);
-  EXPECT_EQ(wrong.error().message,
-            "\"wing.length_mm\" is no parameter of a bone of this joint; begin with one of femur., tibia.");
+  // The example is a bone's parameter of that name, if there is one.
+  for (const auto& [name, example] : {std::pair{"wing.length_mm", "femur.length_mm"},
+                                      {"slope_degrees", "tibia.slope_degrees"},
+                                      {"wing_mm", "femur.length_mm"}}) {
+    const auto wrong = joint_changes("knee", {{name, 1.0}}, kOwn, members);
+    ASSERT_FALSE(wrong) << name;
+    EXPECT_EQ(wrong.error().message, std::string("\"") + name +
+                                         "\" is no parameter of a knee; write gap_mm, cut_mm, or a bone's parameter "
+                                         "after its name, such as " +
+                                         example);
+  }
+}
+
+TEST(Joint, BonesOfOneNameAreToldApart) {
+  const Joint joint = joint_of(member("left", "femur"), member("right", "femur"), member("lower", "tibia"));
+  EXPECT_EQ(joint.names(), (std::vector<std::string>{"left, femur", "right, femur", "tibia", "fibula"}));
+}
+
+TEST(Joint, AMembersErrorBeginsWithItsName) {
+  EXPECT_EQ(of_member("femur", Result<int>(bad_input("shell_mm is 9; give a value from 0.6 to 4"))).error().message,
+            "femur.shell_mm is 9; give a value from 0.6 to 4");
+  EXPECT_EQ(of_member("femur", Result<int>(bad_input("\"wing_mm\" is no parameter of this bone"))).error().message,
+            "\"femur.wing_mm\" is no parameter of this bone");
+}
+
+TEST(Joint, PointsAndLinesThatABoneDoesNotHaveAreABrokenPromise) {
+  const auto bone = bone_of({});
+  EXPECT_EQ(point_of(*bone, "head centre"), landmark(*bone, "head centre"));
+  EXPECT_GT(line_of(*bone, "sciatic nerve").size(), 2u);
+  EXPECT_DEATH(static_cast<void>(point_of(*bone, "wing")), "landmarks");
+  EXPECT_DEATH(static_cast<void>(line_of(*bone, "wing")), "structures");
 }
 
 // Two femurs side by side: their boxes overlap, and their epicondyles face each other across a known gap.

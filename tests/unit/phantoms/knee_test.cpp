@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <set>
 
 #include "common/phantoms/patella.hpp"
 #include "common/phantoms/phantom_case.hpp"
@@ -50,6 +51,67 @@ TEST(Knee, ThePatellaIsAsHighAsItsRatioSays) {
         std::hypot(landmark(*knee, "patellar apex").z() - end.z(), landmark(*knee, "patellar apex").y() - end.y());
     EXPECT_NEAR(ligament / PatellaParameters{}.height_mm, ratio, 0.01);
   }
+}
+
+// Where it is made, it is as high as asked, and otherwise the ratio is named.
+TEST(Knee, APatellaThatItsLigamentDoesNotReachIsRefused) {
+  const TibiaParameters tibia;
+  const auto expect_reached = [&](std::map<std::string, double> changes) {
+    const double ratio = changes.at("insall_salvati"), height = changes.at("patella.height_mm");
+    const auto made = make_bone({.kind = "knee", .changes = std::move(changes)});
+    if (!made) {
+      EXPECT_TRUE(made.error().message.starts_with("insall_salvati is ")) << made.error().message;
+      EXPECT_NE(made.error().message.find("does not reach a patella"), std::string::npos) << made.error().message;
+      return false;
+    }
+    const Vec3 apex = landmark(**made, "patellar apex");
+    const Vec3 end = landmark(**made, "tibial tuberosity") + 0.1 * tibia.plateau_width_mm * Vec3::UnitZ();
+    EXPECT_NEAR(std::hypot(apex.z() - end.z(), apex.y() - end.y()) / height, ratio, 1e-6);
+    return true;
+  };
+  for (const double height : {35.0, 45.0, 60.0})
+    for (const double ratio : {0.7, 1.0, 1.6})
+      for (const double gap : {5.5, 12.0})
+        expect_reached({{"insall_salvati", ratio}, {"patella_gap_mm", gap}, {"patella.height_mm", height}});
+  EXPECT_FALSE(expect_reached({{"insall_salvati", 0.7},
+                               {"patella_gap_mm", 12.0},
+                               {"patella.height_mm", 28.0},
+                               {"patella.width_mm", 37.0},
+                               {"patella.thickness_mm", 20.0},
+                               {"femur.condyle_depth_mm", 78.0},
+                               {"tibia.tuberosity_mm", 0.0},
+                               {"tibia.plateau_depth_mm", 38.0},
+                               {"tibia.depth_86_mm", 30.0}}));
+}
+
+TEST(Knee, NamesDoNotDependOnTheCuts) {
+  const auto names_of_knee = [](const char* cut, double length_mm) {
+    const BoneAnatomy anatomy = knee_of(Side::left, {{cut, length_mm}})->anatomy();
+    std::pair<std::set<std::string>, std::set<std::string>> names;
+    for (const Landmark& found : anatomy.landmarks) names.first.insert(found.name);
+    for (const PlannedAxis& found : anatomy.axes) names.second.insert(found.name);
+    return names;
+  };
+  const auto expected = names_of_knee("tibia_cut_mm", 110.0);
+  EXPECT_TRUE(expected.second.contains("tibia, mechanical axis"));
+  for (const char* cut : {"tibia_cut_mm", "femur_cut_mm"})
+    for (double length_mm = 60.0; length_mm <= 160.0; length_mm += 1.0)
+      EXPECT_EQ(names_of_knee(cut, length_mm), expected) << cut << " " << length_mm;
+}
+
+// Each parameter of the knee at the ends of its range: made, or refused by a sentence that names it.
+TEST(Knee, EndsOfRangesAreMadeOrNamed) {
+  for (const std::string_view preset : kPresets)
+    for (const auto& field : knee_fields())
+      for (const double value : {field.least, field.most}) {
+        const std::string name(field.name);
+        const auto made = make_bone({.kind = "knee", .preset = std::string(preset), .changes = {{name, value}}});
+        if (made) continue;
+        EXPECT_EQ(made.error().message.find(name + " is "), 0u)
+            << preset << ", " << name << ": " << made.error().message;
+      }
+  // The widest gap before the femur is wider than cartilage of both bones.
+  EXPECT_TRUE(make_bone({.kind = "knee", .changes = {{"patella_gap_mm", 12.0}}}));
 }
 
 TEST(Knee, RightIsTheMirrorImageOfLeft) {
@@ -168,9 +230,9 @@ TEST(Knee, WhatDoesNotFitIsOneSentenceThatNamesTheParameter) {
     refused({{std::string(field.name), field.least - 0.1}}, std::string(field.name), "give a value from");
     refused({{std::string(field.name), field.most + 0.1}}, std::string(field.name), "give a value from");
   }
-  refused({{"femur.neck_height_mm", 46.0}}, "femur: neck_height_mm", "head_diameter_mm");
-  refused({{"tibia.wing_mm", 1.0}}, "tibia: \"wing_mm\"", "no parameter");
-  refused({{"wing.length_mm", 1.0}}, "\"wing.length_mm\"", "femur., tibia., patella.");
+  refused({{"femur.neck_height_mm", 46.0}}, "femur.neck_height_mm is 46", "head_diameter_mm");
+  refused({{"tibia.wing_mm", 1.0}}, "\"tibia.wing_mm\"", "no parameter");
+  refused({{"wing.length_mm", 1.0}}, "\"wing.length_mm\" is no parameter of a knee", "femur.length_mm");
   refused({{"length_mm", 400.0}}, "\"length_mm\"", "femur.length_mm");
   refused({{"joint_gap_mm", 4.0}, {"femur.cartilage_mm", 2.5}, {"tibia.cartilage_mm", 2.5}}, "joint_gap_mm is 4",
           "cartilage_mm of femur and tibia");
@@ -181,7 +243,7 @@ TEST(Knee, WhatDoesNotFitIsOneSentenceThatNamesTheParameter) {
            {"femur.notch_width_mm", 12.0},
            {"femur.bicondylar_width_mm", 74.0},
            {"tibia.plateau_width_mm", 98.0}},
-          "joint_gap_mm is 1.5", "femur and tibia touch");
+          "joint_gap_mm is 1.5", "femur and tibia come nearer than 1 mm to each other");
 }
 
 // What the recipe does not say of cartilage fills the gaps.

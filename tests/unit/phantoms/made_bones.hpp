@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <stdexcept>
 #include <string>
 #include <utility>
 
@@ -13,10 +14,11 @@
 
 namespace osteon::phantoms {
 
+// The bone of a recipe that fits. It throws what make_bone() says of another one.
 inline std::unique_ptr<PhantomBone> bone_of(const BoneRecipe& recipe) {
   auto made = make_bone(recipe);
-  EXPECT_TRUE(made) << made.error().message;
-  return made ? std::move(*made) : nullptr;
+  if (!made) throw std::runtime_error(made.error().message);
+  return std::move(*made);
 }
 
 inline Vec3 landmark(const PhantomBone& bone, const std::string& name) {

@@ -143,6 +143,43 @@ TEST(PhantomBoneCase, PitchesThatDoNotFitAreOneSentence) {
   }
 }
 
+// A ball of bone, and as many names as asked.
+class Ball final : public PhantomBone {
+ public:
+  Ball(const Vec3& centre, double radius_mm, std::size_t bones)
+      : centre_(centre), radius_mm_(radius_mm), bones_(bones) {}
+
+  [[nodiscard]] std::vector<std::string> names() const override { return std::vector<std::string>(bones_, "ball"); }
+  [[nodiscard]] std::vector<NamedValue> parameters() const override { return {{"radius_mm", radius_mm_, 0.0, 99.0}}; }
+  [[nodiscard]] BoneAnatomy anatomy() const override { return {}; }
+  [[nodiscard]] Box bounds() const override { return Box{centre_, centre_}.grown(radius_mm_); }
+  [[nodiscard]] BoneDepths depths(const Vec3& at_mm) const override {
+    const double surface_mm = (at_mm - centre_).norm() - radius_mm_;
+    return {surface_mm, surface_mm + 1.0, 1e3};
+  }
+  [[nodiscard]] double cancellous_g_cm3(const Vec3& /*at_mm*/) const override { return 0.3; }
+  [[nodiscard]] double cortical_g_cm3(int /*bone*/) const override { return 1.9; }
+  [[nodiscard]] double marrow_g_cm3(int /*bone*/) const override { return 0.1; }
+
+ private:
+  Vec3 centre_;
+  double radius_mm_;
+  std::size_t bones_;
+};
+
+TEST(PhantomBoneCase, ABoneBetweenVoxelsIsOneSentence) {
+  const auto found = made(Ball({0.5, 0.5, 0.5}, 0.2, 1), 1.0);
+  ASSERT_FALSE(found);
+  EXPECT_EQ(found.error().code, ErrorCode::invalid_input);
+  EXPECT_EQ(found.error().message, "no voxel of a pitch of 1 mm is in this bone; give a smaller --pitch");
+}
+
+// Labels are bytes, three for each bone.
+TEST(PhantomBoneCase, MoreLabelsThanBytesAreABrokenPromise) {
+  ASSERT_TRUE(made(Ball(Vec3::Zero(), 3.0, 85), 1.0));
+  EXPECT_DEATH(static_cast<void>(made(Ball(Vec3::Zero(), 3.0, 86), 1.0)), "first_structure");
+}
+
 TEST(PhantomBoneCase, StopsWhenAsked) {
   const auto bone = make_bone({});
   ASSERT_TRUE(bone);

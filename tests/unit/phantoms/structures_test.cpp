@@ -35,7 +35,7 @@ double length_of(const std::vector<Vec3>& line) {
   return sum;
 }
 
-TEST(Structures, ATubeHasItsVolumeAndEndsRound) {
+TEST(Structures, ATubeIsTheDistanceToItsLine) {
   const auto nowhere = [](const Vec3&) { return 100.0; };
   const Structure made = tube("a", LabelKind::nerve, {Vec3::Zero(), {0.0, 0.0, 30.0}, {0.0, 40.0, 30.0}}, 3.0, nowhere);
   EXPECT_EQ(made.kind, LabelKind::nerve);
@@ -77,9 +77,21 @@ TEST(Structures, ALineBesideBoneKeepsClearOfIt) {
       EXPECT_GT(at.x(), 20.0);
     }
   }
-  for (const Vec3& at : rounded({Vec3::Zero(), {40.0, 0.0, 0.0}, {40.0, 40.0, 0.0}}))
-    EXPECT_GT(at.x() - at.y(), -1e-9);  // on the inner side of the corner
   EXPECT_NEAR((surface_from({1.0, 0.0, 0.0}, Vec3::UnitX(), ball) - Vec3(20.0, 0.0, 0.0)).norm(), 0.0, 0.02);
+}
+
+TEST(Structures, ARoundedLineHasItsEndsAndNoCorner) {
+  const Vec3 end(40.0, 40.0, 0.0);
+  const std::vector<Vec3> line = rounded({Vec3::Zero(), {40.0, 0.0, 0.0}, end});
+  EXPECT_EQ(line.front(), Vec3::Zero());
+  EXPECT_EQ(line.back(), end);
+  for (const Vec3& at : line) EXPECT_GT(at.x() - at.y(), -1e-9);  // on the inner side of the corner
+  double largest = 0.0;
+  for (std::size_t i = 1; i + 1 < line.size(); ++i) {
+    const Vec3 before = line[i] - line[i - 1], after = line[i + 1] - line[i];
+    largest = std::max(largest, std::atan2(before.cross(after).norm(), before.dot(after)));
+  }
+  EXPECT_LT(largest * 180.0 / std::numbers::pi, 20.0);
 }
 
 // The whole of each structure, on a lattice in its box: it is there, and it is never in bone. Those of a joint may be
@@ -112,10 +124,10 @@ void expect_beside_bone(const PhantomBone& bone, double coarsest_mm, double leas
 
 TEST(Structures, NeverReachIntoBone) {
   test::Random random(91);
-  for (const char* kind : {"femur", "tibia", "patella"})
+  for (const char* kind : {"femur", "tibia", "patella", "pelvis", "hip"})
     for (const std::string_view preset : kPresets)
-      expect_beside_bone(*bone_of({.kind = kind, .preset = std::string(preset)}), 2.3, 1.0,
-                         std::string(kind) + " " + std::string(preset));
+      expect_beside_bone(*bone_of({.kind = kind, .preset = std::string(preset)}), 2.3,
+                         kind == std::string("hip") ? 0.9 : 1.0, std::string(kind) + " " + std::string(preset));
   for (const char* kind : {"femur", "tibia", "patella", "knee"})
     for (int set = 0; set < 6; ++set) {
       const auto bone = random_bone(kind, kind == std::string("knee") ? 0.05 : 0.08, random);
