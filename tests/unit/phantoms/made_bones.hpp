@@ -28,6 +28,17 @@ inline Vec3 landmark(const PhantomBone& bone, const std::string& name) {
   return Vec3::Zero();
 }
 
+// Expects that such a bone is refused by one sentence that contains the parameter's own name and `also`.
+inline void expect_refused(const std::string& kind, const std::string& name, double value, const std::string& also) {
+  const auto made = make_bone({.kind = kind, .changes = {{name, value}}});
+  ASSERT_FALSE(made) << name << " " << value;
+  EXPECT_EQ(made.error().code, ErrorCode::invalid_input);
+  const std::string& text = made.error().message;
+  EXPECT_NE(text.find(name.substr(name.find('.') + 1)), std::string::npos) << text;
+  EXPECT_NE(text.find(also), std::string::npos) << text;
+  EXPECT_EQ(text.find('\n'), std::string::npos) << text;
+}
+
 // A bone of random words and parameters; those that do not fit together are drawn again. Each is up to `spread` away
 // from the preset. Cartilage keeps the thickness that follows from the others.
 inline std::unique_ptr<PhantomBone> random_bone(const std::string& kind, double spread, test::Random& random) {
