@@ -48,6 +48,14 @@ TEST(Structures, ATubeIsTheDistanceToItsLine) {
 // A ball of bone, of which everything is known.
 double ball(const Vec3& at) { return at.norm() - 20.0; }
 
+// The line goes through the ball.
+TEST(Structures, ATubeEndsWhereItWouldMeetBone) {
+  const Structure made = tube("a", LabelKind::vessel, {{-40.0, 0.0, 0.0}, {40.0, 0.0, 0.0}}, 3.0, ball);
+  for (const double x : {0.0, 10.0, 19.9}) EXPECT_GT(made.distance_mm({x, 0.0, 0.0}), 0.0) << x;
+  EXPECT_LT(made.distance_mm({20.2, 0.0, 0.0}), 0.0);
+  EXPECT_NEAR(made.distance_mm({30.0, 0.0, 0.0}), -3.0, 1e-12);
+}
+
 TEST(Structures, CartilageOnABallIsAShell) {
   const Structure made = cartilage("a", 2.0, Box{Vec3::Constant(-22.0), Vec3::Constant(22.0)}, ball,
                                    [](const Vec3& at) { return -at.z(); });
