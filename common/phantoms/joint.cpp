@@ -21,29 +21,28 @@ double beyond_mm(const std::optional<Cut>& cut, const Vec3& at) {
   return cut ? cut->normal.dot(at - cut->point_mm) : -std::numeric_limits<double>::infinity();
 }
 
+// The corners of a box are numbered 0 to 7: a bit for each axis says whether it is at the box's greatest value.
+Vec3 corner(const Box& box, int bits) {
+  return {(bits & 1) != 0 ? box.max_mm.x() : box.min_mm.x(), (bits & 2) != 0 ? box.max_mm.y() : box.min_mm.y(),
+          (bits & 4) != 0 ? box.max_mm.z() : box.min_mm.z()};
+}
+
 Box moved(const Box& box, const Pose& pose) {
   Box found;
-  for (int corner = 0; corner < 8; ++corner)
-    found.include(pose.point({(corner & 1) != 0 ? box.max_mm.x() : box.min_mm.x(),
-                              (corner & 2) != 0 ? box.max_mm.y() : box.min_mm.y(),
-                              (corner & 4) != 0 ? box.max_mm.z() : box.min_mm.z()}));
+  for (int bits = 0; bits < 8; ++bits) found.include(pose.point(corner(box, bits)));
   return found;
 }
 
 // Contains what a cut leaves of a box.
 Box kept(const Box& box, const std::optional<Cut>& cut) {
   if (!cut) return box;
-  const auto corner = [&](int bits) {
-    return Vec3((bits & 1) != 0 ? box.max_mm.x() : box.min_mm.x(), (bits & 2) != 0 ? box.max_mm.y() : box.min_mm.y(),
-                (bits & 4) != 0 ? box.max_mm.z() : box.min_mm.z());
-  };
   Box found;
   for (int bits = 0; bits < 8; ++bits) {
-    const Vec3 a = corner(bits);
+    const Vec3 a = corner(box, bits);
     const double beyond_a = beyond_mm(cut, a);
     if (beyond_a <= 0.0) found.include(a);
     for (const int axis : {1, 2, 4}) {
-      const Vec3 b = corner(bits ^ axis);
+      const Vec3 b = corner(box, bits ^ axis);
       const double beyond_b = beyond_mm(cut, b);
       if (beyond_a <= 0.0 && beyond_b > 0.0) found.include(a + beyond_a / (beyond_a - beyond_b) * (b - a));
     }

@@ -37,13 +37,12 @@ BoneTissue tissue_of(const BoneDepths& at) {
   return at.marrow_mm >= 0.0 ? BoneTissue::cancellous : BoneTissue::marrow;
 }
 
-Box PhantomBone::bounds_of_all() const {
-  Box box = bounds();
-  for (const Structure& structure : structures()) {
-    box.include(structure.bounds.min_mm);
-    box.include(structure.bounds.max_mm);
+Box with_structures(Box bounds, std::span<const Structure> structures) {
+  for (const Structure& structure : structures) {
+    bounds.include(structure.bounds.min_mm);
+    bounds.include(structure.bounds.max_mm);
   }
-  return box;
+  return bounds;
 }
 
 double PhantomBone::density_g_cm3(const Vec3& at_mm, double blur_mm) const {

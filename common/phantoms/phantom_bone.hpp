@@ -4,6 +4,7 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -45,7 +46,7 @@ struct BoneDepths {
 };
 // How fast BoneDepths::surface_mm grows at most beside the surface, mm per mm. Everywhere, the surface is at least as
 // far as surface_mm says, divided by this.
-inline constexpr double kSteepest = 2.0;
+inline constexpr double kSteepest = 2.6;
 
 [[nodiscard]] BoneTissue tissue_of(const BoneDepths& depths);
 
@@ -64,6 +65,9 @@ struct Structure {
   std::function<double(const Vec3& at_mm)> distance_mm;  // to its surface, mm, negative inside; near it to first order
   std::vector<Vec3> line_mm = {};                        // the middle of a vessel or nerve, from its proximal end
 };
+
+// Contains a bone's bounds and those of its structures.
+[[nodiscard]] Box with_structures(Box bounds, std::span<const Structure> structures);
 
 // Immutable, so any thread may read it. The frame is LPS in millimetres; each kind says where its origin lies.
 class PhantomBone {
@@ -85,7 +89,6 @@ class PhantomBone {
   [[nodiscard]] virtual std::vector<Structure> structures() const { return {}; }
 
   [[nodiscard]] BoneTissue tissue(const Vec3& at_mm) const { return tissue_of(depths(at_mm)); }
-  [[nodiscard]] Box bounds_of_all() const;  // contains the bone and its structures
   // Mean of the density over `blur_mm` of depth, as samples of that pitch have it. Outside, cortex goes on.
   [[nodiscard]] double density_g_cm3(const Vec3& at_mm, double blur_mm) const;
 };

@@ -167,7 +167,7 @@ Result<PhantomCase> build_phantom_case(const PhantomBone& bone, const PhantomCas
                                        const KeepGoing& keep_going) {
   const double pitch_mm = options.pitch_mm;
   const std::vector<Structure> structures = bone.structures();
-  const CoordBox box = covering_samples(bone.bounds_of_all().grown(kBand * pitch_mm), pitch_mm);
+  const CoordBox box = covering_samples(with_structures(bone.bounds(), structures).grown(kBand * pitch_mm), pitch_mm);
   if (auto fits = check_pitch(box, pitch_mm); !fits) return tl::unexpected(fits.error());
   auto scan = scan_of(bone, structures, options, box, part(keep_going, 0.0, kScanEnd));
   if (!scan) return tl::unexpected(scan.error());

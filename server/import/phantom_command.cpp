@@ -3,7 +3,9 @@
 #include <filesystem>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
+#include <string_view>
 #include <system_error>
 #include <utility>
 #include <vector>
@@ -172,6 +174,8 @@ Result<std::string> run_phantom(const PhantomArguments& a, const StopSignal& sto
   return layered ? run_layers(a, stop) : run_bone(a, stop);
 }
 
+std::vector<std::string> words(std::span<const std::string_view> known) { return {known.begin(), known.end()}; }
+
 // `dicom`: the option --dicom.
 void add_bone_options(CLI::App& phantom, CLI::Option* dicom, PhantomArguments& a) {
   const auto text = [&](const char* name, std::string& value, const char* help) {
@@ -181,9 +185,9 @@ void add_bone_options(CLI::App& phantom, CLI::Option* dicom, PhantomArguments& a
   text("--side", a.side, "Of a bone: left (default) or right; a pelvis has both")
       ->check(CLI::IsMember({"left", "right"}));
   text("--preset", a.preset, "Of a bone: female, male (default), small or large")
-      ->check(CLI::IsMember({"female", "male", "small", "large"}));
+      ->check(CLI::IsMember(words(phantoms::kPresets)));
   text("--condition", a.condition, "Of a bone: young, adult (default) or osteoporotic")
-      ->check(CLI::IsMember({"young", "adult", "osteoporotic"}));
+      ->check(CLI::IsMember(words(phantoms::kConditions)));
   text("--parameters", a.parameters, "YAML file with these words and with parameters of the bone");
   text("--stl", a.stl, "Also write the bone's surface to this STL file");
   text("--truth", a.truth, "Also write parameters, landmarks, axes, planes and labels of the bone, to this folder");

@@ -47,14 +47,14 @@ BlurredHu blurred_hu(const phantoms::PhantomBone& bone, double blur_mm) {
 }
 
 ScannerSettings scanner_around(const phantoms::PhantomBone& bone, ScannerSettings settings, double slice_mm) {
-  const Box box = bone.bounds_of_all(), around = box.grown(kFieldAround_mm);
+  const Box box = phantoms::with_structures(bone.bounds(), bone.structures()), around = box.grown(kFieldAround_mm);
   const Vec3 size = around.size_mm();
   const double tilt = std::abs(settings.tilt_degrees) * std::numbers::pi / 180.0;
   settings.centre_mm = box.centre_mm();
   settings.width_mm = size.x();
   settings.height_mm = size.y() / std::cos(tilt);
-  // Tilted slices reach less far along z in front than behind. The gaps are along the slices' normal. Whole slices are
-  // beyond an end of the bone, and before a sawn one.
+  // Tilted slices reach less far along z in front than behind. The gaps are along the slices' normal. The first and the
+  // last slice lie outside a natural end, and inside the bone at a sawn end.
   const double lean_mm = 0.5 * size.y() * std::tan(tilt);
   const auto [sawn_below, sawn_above] = bone.sawn_ends();
   const double low = sawn_below ? box.min_mm.z() + lean_mm : around.min_mm.z() - lean_mm;

@@ -120,12 +120,24 @@ class DrillingRoom : public testing::Test {
     EXPECT_FALSE(found.empty()) << "between " << from_mm << " and " << to_mm;
     return found;
   }
+  // The last entry up to each one that comes after missed ticks. Then the device showed too little force, and the drill
+  // stays behind the hand for a while.
+  static std::vector<std::size_t> last_late(const Hole& hole) {
+    const std::vector<double>& ns = hole.log["mono_ns"];
+    std::vector<std::size_t> last(ns.size(), 0);
+    for (std::size_t i = 1; i < ns.size(); ++i) last[i] = ns[i] - ns[i - 1] > 2e6 ? i : last[i - 1];
+    return last;
+  }
   // Median of a column over the ticks in which the tool moves. On a busy machine the tool stands still in some ticks,
   // and starts and stops in those beside them. A mean would measure how busy the machine is. At most a tenth may stand.
+  // Half a second after missed ticks does not count.
   static double typical(const Hole& hole, const std::string& column, double from_mm, double to_mm) {
+    constexpr std::size_t kSettled = 500;
+    const std::vector<std::size_t> late = last_late(hole);
     std::vector<double> values;
     std::size_t standing = 0;
     for (const std::size_t i : on_the_way_in(hole, from_mm, to_mm)) {
+      if (late[i] > 0 && i < late[i] + kSettled) continue;
       if (hole.log["feed_mm_per_s"][i] < 1e-3)
         ++standing;
       else
@@ -141,12 +153,6 @@ class DrillingRoom : public testing::Test {
   static double near_cortex(const Hole& hole, const std::string& column) { return typical(hole, column, 1.5, 4.8); }
   static double medulla(const Hole& hole, const std::string& column) { return typical(hole, column, 6.5, 24.5); }
   static double far_cortex(const Hole& hole, const std::string& column) { return typical(hole, column, 26.5, 29.5); }
-
-  // Whether the loop missed ticks. A device shows too little force then.
-  static bool missed_ticks(const Hole& hole) {
-    const std::vector<double>& ns = hole.log["mono_ns"];
-    return std::ranges::adjacent_find(ns, [](double a, double b) { return b - a > 2e6; }) != ns.end();
-  }
 
   // How far the tip goes beyond the far face.
   static double plunge_mm(const Hole& hole) {
@@ -175,23 +181,16 @@ TEST_F(DrillingRoom, ThreeHolesAreGoneFromTheBone) {
 
 TEST_F(DrillingRoom, TheRigFeelsChisForcesAndNothingAfterTheExit) {
   const Hole& rig = results_->holes["rig"];
-  // Chi (7.3) at 1000 rpm. The rig moves the hand at 1 mm/s, and so the drill. Only missed ticks leave it behind:
-  // it is slower then, and its force is that of its own feed.
-  const bool late = missed_ticks(rig);
-  const auto expect_law = [&](auto in_layer, double at_1_mm_per_s_n) {
-    const double feed_mm_per_s = in_layer(rig, "feed_mm_per_s");
-    EXPECT_NEAR(in_layer(rig, "force_physical_n") / (at_1_mm_per_s_n * std::pow(feed_mm_per_s, 0.5189)), 1.0, 0.05);
-    if (!late) {
-      EXPECT_NEAR(feed_mm_per_s, 1.0, 0.05);
-    }
-  };
-  expect_law(near_cortex, 28.9);
-  expect_law(medulla, 3.25);
-  expect_law(far_cortex, 28.9);
+  // Chi (7.3) at 1000 rpm and 1 mm/s.
+  EXPECT_NEAR(near_cortex(rig, "force_physical_n"), 28.9, 0.05 * 28.9)
+      << "at " << near_cortex(rig, "feed_mm_per_s") << " mm/s, the last missed ticks in row "
+      << last_late(rig).at(on_the_way_in(rig, 1.5, 4.8).back()) << " of " << on_the_way_in(rig, 1.5, 4.8).back();
+  EXPECT_NEAR(medulla(rig, "force_physical_n"), 3.25, 0.05 * 3.25);
+  EXPECT_NEAR(far_cortex(rig, "force_physical_n"), 28.9, 0.05 * 28.9);
   for (const std::size_t i : on_the_way_in(rig, kThickness_mm + kCone_mm + 0.5, kThickness_mm + 2.9))
     EXPECT_LT(rig.log["force_physical_n"][i], 0.05);
   // The rig's hand moves at 1 mm/s. The drill follows it. Where a busy machine misses ticks, the device shows too
-  // little force: the coupling releases that extension, and the drill stays behind. The feeds above bound how far.
+  // little force: the coupling releases that extension, and the drill stays behind. The forces above bound how far.
   const std::vector<std::size_t> in_cortex = on_the_way_in(rig, 1.5, 4.8);
   ASSERT_GT(in_cortex.size(), 1000u);
   const auto change = [&](const std::string& column) {

@@ -5,10 +5,12 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <span>
 #include <stdexcept>
 #include <string>
 #include <utility>
 
+#include "common/phantoms/bone_parameters.hpp"
 #include "common/phantoms/phantom_bone.hpp"
 #include "tests/support/scenes/random.hpp"
 
@@ -37,6 +39,15 @@ inline void expect_refused(const std::string& kind, const std::string& name, dou
   EXPECT_NE(text.find(name.substr(name.find('.') + 1)), std::string::npos) << text;
   EXPECT_NE(text.find(also), std::string::npos) << text;
   EXPECT_EQ(text.find('\n'), std::string::npos) << text;
+}
+
+// Expects it of each parameter of a table, beyond both ends of its range.
+template <class Parameters>
+void expect_ranges(const std::string& kind, std::span<const ParameterField<Parameters>> fields) {
+  for (const ParameterField<Parameters>& field : fields)
+    for (const double value : {field.least - 0.01 * std::max(1.0, std::abs(field.least)),
+                               field.most + 0.01 * std::max(1.0, field.most), std::nan("")})
+      expect_refused(kind, std::string(field.name), value, "give a value from");
 }
 
 // A bone of random words and parameters; those that do not fit together are drawn again. Each is up to `spread` away
