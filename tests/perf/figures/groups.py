@@ -254,6 +254,7 @@ GROUPS = {**kernels.GROUPS, **devices.GROUPS, **authentication.GROUPS, **insider
           **feel.GROUPS, **filters.GROUPS, **haptics.GROUPS, **laws.GROUPS, **rooms.GROUPS, "expert": expert,
           "novice": novice, "rig": rig, "scan": scan, "real_imports": imports.real_imports,
           "import_accuracy": imports.import_accuracy,
+          "phantoms": imports.phantoms,
           "import_cost": imports.import_cost,
           "import_cost_long": imports.import_cost_long,
           "region_growing": imports.region_growing,

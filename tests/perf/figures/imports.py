@@ -150,6 +150,30 @@ def import_accuracy(run):
     return values
 
 
+# Bones of the joints that osteon-phantom-accuracy scans: in the names of figures.
+PHANTOM_JOINTS = {"knee": ("femur", "tibia", "fibula", "patella"), "hip": ("hip bone", "femur")}
+
+
+def phantoms(run):
+    """How well phantom bones come back from a simulated CT, and how near a phantom comes to a real femur."""
+    run.say("accuracy of phantoms")
+    folder = run.folder / "phantoms"
+    folder.mkdir(exist_ok=True)
+    meshes = run.shared_data("bone-meshes")
+    found = json.loads(run.output("osteon-phantom-accuracy", folder, *([meshes / "femur.stl"] if meshes else [])))
+    values = {f"phantom_{bone}_dice": Measured(found[bone]["dice"]) for bone in ("femur", "tibia")}
+    values |= {f"phantom_femur_{what}": Measured(abs(found["femur"][f"{what}_percent"]))
+               for what in ("cortical", "cancellous")}
+    values |= {f"phantom_{joint}_{bone.replace(' ', '_')}_dice": Measured(found[joint][bone])
+               for joint, bones in PHANTOM_JOINTS.items() for bone in bones}
+    values["phantom_force_difference"] = Measured(found["force_percent"])
+    if not meshes:
+        run.skip("phantom_fit", "there is no shared/data beside the checkout")
+    fit = found.get("fit", {})
+    return values | {"phantom_fit_distance": Measured(fit.get("distance_mm")),
+                     "phantom_fit_sections": Measured(fit.get("sections_percent"))}
+
+
 def floods():
     """Region growing as a user of SciPy or scikit-image writes it, for those of them that are installed."""
     found = {}

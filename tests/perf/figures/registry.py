@@ -678,6 +678,22 @@ FIGURES = [
                SHARP_CORTEX),
         Figure(f"import_{bone}_{scan}_mass", "percent", f"error of its mass, {scan_name}", "import_accuracy",
                baseline=SHARP_CORTEX))],
+    # Phantom bones through a simulated CT: slices of 3 mm, tilted by 12 degrees, noise of 30 HU, a blur of 0.5 mm.
+    *[Figure(f"phantom_{bone}_dice", "ratio", f"Dice of {what} and its import", "phantoms", (">=", 0.97))
+      for bone, what in (("femur", "a phantom femur"), ("tibia", "a phantom tibia with its fibula"))],
+    Figure("phantom_femur_cortical", "percent", "error of the density within cortex of that femur", "phantoms",
+           ("<=", 3.0)),
+    Figure("phantom_femur_cancellous", "percent", "the same of its cancellous bone", "phantoms", ("<=", 5.0)),
+    *[Figure(f"phantom_{joint}_{bone}_dice", "ratio", f"Dice of the {bone.replace('_', ' ')} of a phantom {joint}, "
+             "grown from seeds", "phantoms", (">=", 0.95))
+      for joint, bones in (("knee", ("femur", "tibia", "fibula", "patella")), ("hip", ("hip_bone", "femur")))
+      for bone in bones],
+    Figure("phantom_force_difference", "percent", "mean difference of the thrust along a hole through a phantom femur "
+           "and through the import of its scan, of the mean thrust", "phantoms", ("<=", 10.0)),
+    Figure("phantom_fit_distance", "mm", "mean distance of a real femur and the phantom fitted to it, the larger one "
+           "of both ways", "phantoms", ("<=", 3.0)),
+    Figure("phantom_fit_sections", "percent", "largest difference of areas and second moments of their sections, from "
+           "20 to 75 % of the length", "phantoms", ("<=", 15.0)),
     Figure("import_trunk_cpu", "s", "CPU time from a DICOM folder of a trunk, 512 x 512 x 302, to its saved case",
            "import_cost", baseline=ITK_CHAIN),
     Figure("import_cpu_ratio", "ratio", f"the same over that of {ITK_CHAIN}, in turns", "import_cost", ("<=", 1.2)),

@@ -1,19 +1,20 @@
 // Phantom bones through the importer: parameter files, the program's outputs, and a femur that comes back from a CT.
 #include "common/phantoms/phantom_case.hpp"
 
-#include <array>
-#include <cmath>
 #include <cstdio>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <stdexcept>
 
 #include "common/geometry/mesh_file.hpp"
 #include "common/imaging/calibration.hpp"
+#include "common/phantoms/joint.hpp"
 #include "server/import/bone_recipe_file.hpp"
 #include "server/import/dicom_reader.hpp"
 #include "server/import/label_map.hpp"
 #include "server/import/phantom_export.hpp"
 #include "tests/support/process.hpp"
+#include "tests/support/scenes/scanned_phantoms.hpp"
 #include "tests/support/temp_dir.hpp"
 #include "tests/unit/import/fixtures.hpp"
 
@@ -166,171 +167,53 @@ TEST(PhantomProgram, RefusesInOneSentenceAndWritesNothing) {
       << run.err;
 }
 
-struct Sums {
-  double found = 0.0, truth = 0.0;
-  [[nodiscard]] double percent() const { return 100.0 * (found - truth) / truth; }
-};
-
-// The interior of a tissue is this far from its faces: what is nearer, a scan of such slices blurs. Cortex lies along
-// the slices' normal, cancellous bone also below faces along the slices.
-constexpr double kCorticalInterior_mm = 1.0, kCancellousInterior_mm = 2.5;
-
-struct CtAgreement {
-  double dice = 0.0;
-  Sums cortical, cancellous;
-};
-
-// Scans a bone, imports the scan by the ordinary path, saves the case, loads it again and asks the bone itself.
-void scan_and_compare(const phantoms::PhantomBone& bone, const CtOptions& options, CtAgreement& agreement) {
+test::PhantomAgreement agreement_of(const phantoms::BoneRecipe& recipe, const CtOptions& options) {
+  const auto bone = phantoms::make_bone(recipe);
+  if (!bone) throw std::runtime_error(bone.error().message);
   const test::TempDir folder;
-  ScannerSettings settings{.pixel_mm = 0.8, .blur_mm = 0.5, .noise_hu = 30.0, .tilt_degrees = 12.0};
-  settings = scanner_around(bone, settings, 3.0);
-  const auto written = write_simulated_scan(settings, blurred_hu(bone, settings.blur_mm), folder / "ct", keep_going);
-  ASSERT_TRUE(written) << written.error().message;
-  auto scan = read_dicom_series(folder / "ct", keep_going);
-  ASSERT_TRUE(scan) << scan.error().message;
-  const auto made = import_ct(std::move(*scan), options, keep_going);
-  ASSERT_TRUE(made) << made.error().message;
-  ASSERT_TRUE(made->bone->save(folder / "case", made->scan));
-  const auto found = Case::load(folder / "case");
-  ASSERT_TRUE(found) << found.error().message;
-
-  const double pitch = 1.0;
-  const CoordBox box = covering_samples(bone.bounds().grown(4.0), pitch);
-  double both = 0.0, sum = 0.0;
-  Sums &cortical = agreement.cortical, &cancellous = agreement.cancellous;
-  for (int x = box.min.x; x <= box.max.x; ++x)
-    for (int y = box.min.y; y <= box.max.y; ++y)
-      for (int z = box.min.z; z <= box.max.z; ++z) {
-        const Vec3 at = position_mm({x, y, z}, pitch);
-        const phantoms::BoneDepths depths = bone.depths(at);
-        if (depths.surface_mm > 6.0) {
-          sum += found->surface_mm(at) < 0.0 ? 1.0 : 0.0;
-          continue;
-        }
-        const bool real = depths.surface_mm < 0.0, there = found->surface_mm(at) < 0.0;
-        both += real && there ? 1.0 : 0.0;
-        sum += (real ? 1.0 : 0.0) + (there ? 1.0 : 0.0);
-        if (std::max(depths.surface_mm, -depths.cortex_mm) < -kCorticalInterior_mm) {
-          cortical.found += there ? found->density_g_cm3(at) : 0.0;
-          cortical.truth += bone.cortical_g_cm3(depths.bone);
-        }
-        if (depths.cortex_mm < -kCancellousInterior_mm && depths.marrow_mm > kCancellousInterior_mm) {
-          cancellous.found += there ? found->density_g_cm3(at) : 0.0;
-          cancellous.truth += bone.cancellous_g_cm3(at);
-        }
-      }
-  agreement.dice = 2.0 * both / sum;
-  std::printf("[          ] Dice %.4f, density of cortex %+.1f %%, of cancellous bone %+.1f %%\n", agreement.dice,
-              cortical.percent(), cancellous.percent());
+  const auto found = test::agreement_of_scan(**bone, options, folder.path());
+  if (!found) throw std::runtime_error(found.error().message);
+  std::printf("[          ] Dice %.4f, density of cortex %+.1f %%, of cancellous bone %+.1f %%\n", found->dice,
+              found->cortical_percent, found->cancellous_percent);
+  return *found;
 }
 
 TEST(PhantomBoneCt, AFemurComesBackFromThickTiltedNoisySlices) {
-  const auto bone = phantoms::make_bone({});
-  ASSERT_TRUE(bone) << bone.error().message;
-  CtAgreement agreement;
-  scan_and_compare(**bone, {}, agreement);
+  const test::PhantomAgreement agreement = agreement_of({}, {});
   EXPECT_GE(agreement.dice, 0.97);
-  EXPECT_NEAR(agreement.cortical.percent(), 0.0, 3.0);
-  EXPECT_NEAR(agreement.cancellous.percent(), 0.0, 5.0);
+  EXPECT_NEAR(agreement.cortical_percent, 0.0, 3.0);
+  EXPECT_NEAR(agreement.cancellous_percent, 0.0, 5.0);
 }
 
 // The cortex of a fibula is as thin as a slice is thick, so its density is not asked for.
 TEST(PhantomBoneCt, ATibiaAndItsFibulaComeBackAsTwoBones) {
-  const auto bone = phantoms::make_bone({.kind = "tibia", .side = phantoms::Side::right});
-  ASSERT_TRUE(bone) << bone.error().message;
   CtOptions options;
   options.keep = {1, 2};
-  CtAgreement agreement;
-  scan_and_compare(**bone, options, agreement);
-  EXPECT_GE(agreement.dice, 0.97);
+  EXPECT_GE(agreement_of({.kind = "tibia", .side = phantoms::Side::right}, options).dice, 0.97);
 }
 
-// A point deep in the cortex of a bone, far from the ends of a tilted scan.
-Vec3 cortex_of(const phantoms::PhantomBone& bone, int number) {
-  CoordBox box = covering_samples(bone.bounds(), 1.0);
-  box.min.z += 45;
-  box.max.z -= 45;
-  Vec3 found = Vec3::Zero();
-  double deepest = 0.0;
-  for (int x = box.min.x; x <= box.max.x; ++x)
-    for (int y = box.min.y; y <= box.max.y; ++y)
-      for (int z = box.min.z; z <= box.max.z; ++z) {
-        const phantoms::BoneDepths at = bone.depths(position_mm({x, y, z}, 1.0));
-        const double depth = std::min(-at.surface_mm, at.cortex_mm);
-        if (at.bone != number || depth <= deepest) continue;
-        deepest = depth;
-        found = position_mm({x, y, z}, 1.0);
-      }
-  return found;
-}
-
-struct Seed {
-  Vec3 at_mm;
-  int bone = 0;
-};
-
-// Dice of each bone of a joint, if each grows from a seed in its cortex, and from those given. The scan ends in bones.
-void expect_back_apart(const phantoms::PhantomBone& joint, double least_dice, const std::vector<Seed>& more = {}) {
-  const std::vector<std::string> names = joint.names();
+void expect_back_apart(const phantoms::PhantomBone& joint, const std::vector<test::BoneSeed>& more = {}) {
   const test::TempDir folder;
-  ScannerSettings settings{.pixel_mm = 0.8, .blur_mm = 0.5, .noise_hu = 30.0, .tilt_degrees = 12.0};
-  settings = scanner_around(joint, settings, 3.0);
-  ASSERT_TRUE(write_simulated_scan(settings, blurred_hu(joint, settings.blur_mm), folder / "ct", keep_going));
-  auto scan = read_dicom_series(folder / "ct", keep_going);
-  ASSERT_TRUE(scan) << scan.error().message;
-  CtOptions options;
-  options.pitch_mm = 1.0;
-  options.separate = true;
-  const int bones = static_cast<int>(names.size());
-  std::vector<Seed> seeds = more;
-  for (int bone = 1; bone <= bones; ++bone) seeds.push_back({cortex_of(joint, bone), bone});
-  for (const Seed& seed : seeds) {
-    options.grow.seeds_mm.push_back(seed.at_mm);
-    options.grow.bones.push_back(seed.bone);
-  }
-  const auto made = import_ct(std::move(*scan), options, keep_going);
-  ASSERT_TRUE(made) << made.error().message;
-
-  // Where every slice has the whole width of the leg.
-  const Box field = joint.bounds().grown(-30.0), around = joint.bounds().grown(4.0);
-  CoordBox box = covering_samples(around, 1.0);
-  box.min.z = static_cast<int>(field.min_mm.z());
-  box.max.z = static_cast<int>(field.max_mm.z());
-  std::vector<double> both(names.size()), sum(names.size());
-  for (int x = box.min.x; x <= box.max.x; ++x)
-    for (int y = box.min.y; y <= box.max.y; ++y)
-      for (int z = box.min.z; z <= box.max.z; ++z) {
-        const Vec3 at = position_mm({x, y, z}, 1.0);
-        const phantoms::BoneDepths depths = joint.depths(at);
-        const int real = depths.surface_mm < 0.0 ? depths.bone : 0;
-        const int there = made->bone->surface_mm(at) < 0.0 ? made->bone->bone_number({x, y, z}) : 0;
-        if (real > 0) sum[static_cast<std::size_t>(real) - 1] += 1.0;
-        EXPECT_LE(there, bones) << "a bone without a seed";
-        if (there > 0 && there <= bones) sum[static_cast<std::size_t>(there) - 1] += 1.0;
-        if (real > 0 && real == there) both[static_cast<std::size_t>(real) - 1] += 1.0;
-      }
-  for (std::size_t bone = 0; bone < names.size(); ++bone) {
-    const double dice = 2.0 * both[bone] / sum[bone];
-    std::printf("[          ] %s: Dice %.4f\n", names[bone].c_str(), dice);
-    EXPECT_GE(dice, least_dice);
+  const auto found = test::dice_of_bones(joint, more, folder.path());
+  ASSERT_TRUE(found) << found.error().message;
+  EXPECT_EQ(found->size(), joint.names().size());
+  for (const auto& [bone, dice] : *found) {
+    std::printf("[          ] %s: Dice %.4f\n", bone.c_str(), dice);
+    EXPECT_GE(dice, 0.95) << bone;
   }
 }
 
 TEST(PhantomBoneCt, AKneeComesBackAsFourBones) {
   const auto knee = phantoms::make_bone({.kind = "knee"});
   ASSERT_TRUE(knee) << knee.error().message;
-  expect_back_apart(**knee, 0.95);
+  expect_back_apart(**knee);
 }
 
 // In slices this thick, the import divides the femur at its neck and not at the joint, so the head needs its own seed.
 TEST(PhantomBoneCt, AHipComesBackAsTwoBones) {
   const auto hip = phantoms::make_bone({.kind = "hip"});
   ASSERT_TRUE(hip) << hip.error().message;
-  const phantoms::BoneAnatomy anatomy = (*hip)->anatomy();
-  const auto head = std::ranges::find(anatomy.landmarks, "head centre", &Landmark::name);
-  ASSERT_NE(head, anatomy.landmarks.end());
-  expect_back_apart(**hip, 0.95, {{head->point_mm, 2}});
+  expect_back_apart(**hip, {{phantoms::point_of(**hip, "head centre"), 2}});
 }
 
 }  // namespace
