@@ -21,13 +21,14 @@ function(osteon_include_itk target)
   target_include_directories(${target} SYSTEM PRIVATE ${OSTEON_ITK_HEADERS})
   target_compile_options(${target} PRIVATE "SHELL:-include ${PROJECT_SOURCE_DIR}/deploy/cmake/itk_with_clang.h")
 endfunction()
+find_package(Qt5 5.15 REQUIRED COMPONENTS Widgets LinguistTools)
 find_package(PNG REQUIRED)
 find_package(ZLIB REQUIRED)
 find_package(OpenSSL REQUIRED)
 find_package(prometheus-cpp REQUIRED)
 find_package(VTK 9.1 REQUIRED COMPONENTS
   CommonCore CommonDataModel FiltersCore FiltersSources FiltersGeneral IOImage
-  InteractionStyle RenderingCore RenderingOpenGL2 RenderingFreeType RenderingAnnotation)
+  GUISupportQt InteractionStyle RenderingCore RenderingOpenGL2 RenderingFreeType RenderingAnnotation)
 
 pkg_check_modules(grpc REQUIRED IMPORTED_TARGET grpc++)
 pkg_check_modules(microhttpd REQUIRED IMPORTED_TARGET libmicrohttpd)

@@ -330,11 +330,12 @@ int main(int argc, char** argv) {
   app.add_option("--plan", options.hand.plan, "JSON file with the steps of a simulated surgeon");
   app.add_option("--tool", options.hand.tool,
                  "The tool for your own hand, of the box or of the server's --tools, e.g. drill-3.2; no --plan then");
-  app.add_option("--device", options.hand.device,
-                 "simulated or simulated-3.3N (a simulated hand, with a --plan), recorded:FILE (a recording, with its "
-                 "--plan or "
-                 "--tool), or for your hand "
-                 "one of osteon-haptic devices, others added by \"+\": phantom, falcon+spacemouse+pedal")
+  app.add_option(
+         "--device", options.hand.device,
+         "simulated or simulated-3.3N (a simulated hand, with a --plan), recorded:FILE (a recording, with its "
+         "--plan or "
+         "--tool), pointer:SOCKET (the mouse of the window osteon, which starts this program), or for your hand "
+         "one of osteon-haptic devices, others added by \"+\": phantom, falcon+spacemouse+pedal")
       ->capture_default_str();
   app.add_option(
       "--view", options.hand.view,

@@ -14,6 +14,18 @@ Result<ToolOperator> ToolOperator::make(const ToolOperatorOptions& options, cons
     if (!device) return failure(device.error().code, "--device: " + device.error().message);
     choice.recorded_ = std::move(*device);
     choice.simulated_ = {options.device, choice.recorded_->limits()};
+  } else if (options.device == "pointer" || options.device.starts_with("pointer:")) {
+    constexpr std::string_view kPointer = "pointer:";
+    if (options.device.size() <= kPointer.size())
+      return failure(ErrorCode::invalid_input,
+                     "--device pointer: it needs the socket of a window; name it, pointer:SOCKET");
+    // Its hand is simulated, so it shows all the force.
+    choice.simulated_ = {"pointer", SimulatedDeviceParams{}.limits};
+    if (options.plan.empty() && !options.tool.empty()) {
+      Result<std::unique_ptr<PointerFeed>> feed = PointerFeed::start(options.device.substr(kPointer.size()), notice);
+      if (!feed) return tl::unexpected(feed.error());
+      choice.pointer_ = std::move(*feed);
+    }
   } else if (const Result<SimulatedDeviceParams> simulated = find_simulated_device(options.device)) {
     choice.simulated_ = *simulated;
     if (options.plan.empty())
@@ -47,7 +59,7 @@ Result<ToolOperator> ToolOperator::make(const ToolOperatorOptions& options, cons
     if (Result<void> connected = choice.connect(notice); !connected) return tl::unexpected(connected.error());
     return choice;
   }
-  if (choice.person_)
+  if (choice.person_ || choice.simulated_.name == "pointer")
     return failure(
         ErrorCode::invalid_input,
         "--device " + options.device +
@@ -106,7 +118,19 @@ Result<ReadyPlan> ToolOperator::ready_on(const Case& bone, const ToolFinder& fin
   return ready;
 }
 
+Result<std::unique_ptr<Session>> ToolOperator::pointed_on(const Case& bone, const ToolBox& tools, double force_scale) {
+  std::vector<Tool> known;
+  for (const ToolBox::Entry* entry : tools.entries()) known.push_back(entry->tool);
+  Result<ReadyPlan> ready = make_pointed_hand(free_, bone, known);
+  if (!ready) return failure(ready.error().code, "--tool " + options_.tool + ": " + ready.error().message);
+  std::vector<std::string> names;
+  for (const ToolModel& model : ready->tools) names.push_back(model.tool.name);
+  pointer_->set_tools(std::move(names));
+  return std::make_unique<PointerSession>(std::move(*ready), pointer_->exchange(), simulated_, force_scale);
+}
+
 Result<std::unique_ptr<Session>> ToolOperator::on(const Case& bone, const ToolBox& tools, double force_scale) {
+  if (pointer_) return pointed_on(bone, tools, force_scale);
   Result<ReadyPlan> ready = ready_on(bone, [&](std::string_view name) { return tools.find(name); });
   if (!ready) return tl::unexpected(ready.error());
   if (recorded_) {
@@ -137,6 +161,7 @@ std::string_view ToolOperator::device_name() const {
 
 int ToolOperator::losses() const {
   int losses = 0;
+  if (pointer_) losses += pointer_->losses();
   for (const auto& connection : connections_) losses += connection->losses();
   return losses;
 }

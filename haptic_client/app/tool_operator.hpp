@@ -1,5 +1,5 @@
-// Makes the tool operator that the command line names: the simulated hand with a plan, a recording of one, or a person
-// at a device.
+// Makes the tool operator that the command line names: the simulated hand with a plan, a recording of one, a person at
+// a device, or a person with a pointer.
 #pragma once
 #include <memory>
 #include <optional>
@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "common/tools/tool_box.hpp"
+#include "haptic_client/app/pointer_feed.hpp"
 #include "haptic_client/device/connection.hpp"
 #include "haptic_client/device/device_list.hpp"
 #include "haptic_client/device/recorded_device.hpp"
@@ -51,6 +52,8 @@ class ToolOperator {
   Result<void> take_tool();
   // The plan's steps, or those of the person's hand.
   Result<ReadyPlan> ready_on(const Case& bone, const ToolFinder& find) const;
+  // The session of a person with a pointer.
+  Result<std::unique_ptr<Session>> pointed_on(const Case& bone, const ToolBox& tools, double force_scale);
   // Opens a person's devices.
   Result<void> connect(const DeviceNotice& notice);
 
@@ -59,6 +62,7 @@ class ToolOperator {
   SimulatedDeviceParams simulated_;
   FreeHandOptions free_;
   std::unique_ptr<RecordedDevice> recorded_;
+  std::unique_ptr<PointerFeed> pointer_;
   std::unique_ptr<CombinedDevice> person_;
   std::vector<std::unique_ptr<DeviceConnection>> connections_;  // destroyed before the devices
 };

@@ -41,6 +41,12 @@ void SimulatedDevice::take(const HandParams& hand, const Vec3& at_mm) noexcept {
   force_n_.setZero();
 }
 
+void SimulatedDevice::push_with(double push_n) noexcept {
+  HandParams hand = hand_.params();
+  hand.push_n = push_n;
+  hand_.set_params(hand);
+}
+
 void SimulatedDevice::step(double dt_s) noexcept { hand_.step(command_, force_n_, dt_s); }
 
 }  // namespace osteon::haptic

@@ -30,6 +30,8 @@ class SimulatedDevice final : public HapticDevice {
                std::uint32_t buttons) noexcept;
   // [haptic] Another hand takes the handle at a position.
   void take(const HandParams& hand, const Vec3& at_mm) noexcept;
+  // [haptic] The push of the hand, newtons on the device.
+  void push_with(double push_n) noexcept;
   // [haptic] Advances the time.
   void step(double dt_s) noexcept;
   [[nodiscard]] const Hand& hand() const noexcept { return hand_; }

@@ -214,7 +214,7 @@ Result<void> run(const Arguments& arguments) {
 
   // With --script and --screenshot both: save the last picture of the run.
   if (outcome && !arguments.script.empty() && !arguments.screenshot.empty()) {
-    outcome = (*window)->save_png(arguments.screenshot);
+    outcome = (*window)->scene().save_png(arguments.screenshot);
   }
   if (!arguments.summary.empty()) {
     const auto written = write_file(arguments.summary, viewer->summary_json());

@@ -41,13 +41,18 @@ Result<Viewer> Viewer::make(const ViewerOptions& options, BoneWindow& window, Re
                      "the frame log " + options.frame_log.string() + " cannot be written: " + std::strerror(errno));
     }
   }
-  window.look(overview(options.bounds));
+  window.scene().look(overview(options.bounds));
   return viewer;
 }
 
 Viewer::Viewer(const ViewerOptions& options, BoneWindow& window, RenderQueue& render_queue,
                std::optional<ScriptReader> script)
-    : options_(options), window_(&window), queue_(&render_queue), script_(std::move(script)), people_(options.hand) {}
+    : options_(options),
+      window_(&window),
+      queue_(&render_queue),
+      script_(std::move(script)),
+      scene_(render_queue, window.scene()),
+      people_(options.hand) {}
 
 Result<Viewer::State> Viewer::turn(bool interrupted) {
   queue_->wait_for(kTurn);
@@ -58,16 +63,16 @@ Result<Viewer::State> Viewer::turn(bool interrupted) {
   if (events.closed) return State::finished;
   dirty_ = dirty_ || events.redraw;
   if (events.wants_overview) dirty_ = obey(LookAtWhole{}).has_value();
-  if (events.wants_tool && !states_.empty()) dirty_ = obey(LookAtTool{kToolKeyDistance_mm}).has_value();
+  if (events.wants_tool && !scene_.states().empty()) dirty_ = obey(LookAtTool{kToolKeyDistance_mm}).has_value();
 
   draw_by_hand(events);
 
   if (options_.cap) follow_cap();
-  receive();
+  dirty_ = scene_.update(tool_shown_) || dirty_;
   meet_people();
   draw_if_due(false);
   auto state = obey_script();
-  if (options_.looked) options_.looked(window_->camera());
+  if (options_.looked) options_.looked(window_->scene().camera());
   return state;
 }
 
@@ -81,59 +86,10 @@ void Viewer::follow_cap() {
   const std::uint32_t pressed = cap.buttons & ~cap_buttons_;
   cap_buttons_ = cap.buttons;
   if (pressed & kWhole) dirty_ = obey(LookAtWhole{}).has_value();
-  if ((pressed & kTool) && !states_.empty()) dirty_ = obey(LookAtTool{kToolKeyDistance_mm}).has_value();
+  if ((pressed & kTool) && !scene_.states().empty()) dirty_ = obey(LookAtTool{kToolKeyDistance_mm}).has_value();
   const Vec3 push = beyond_rest(cap.push, kRest), twist = beyond_rest(cap.twist, kRest);
   if (push.isZero() && twist.isZero()) return;
-  window_->look(held_by_cap(window_->camera(), push, twist, dt_s));
-  dirty_ = true;
-}
-
-void Viewer::receive() {
-  Delivery delivery = queue_->take();
-  for (const Tool& tool : delivery.tools) window_->learn_tool(tool);
-  if (delivery.any_states) {
-    states_ = std::move(delivery.states);
-    bodies_ = std::move(delivery.bodies);
-    dirty_ = dirty_ || tool_shown_;
-    if (items_ != delivery.items || !delivery.tools.empty()) {
-      items_ = std::move(delivery.items);
-      window_->show_items(items_);
-      dirty_ = true;
-    }
-  }
-  if (delivery.snapshot_begun) {
-    scene_.begin_snapshot();
-    surface_complete_ = false;
-    snapshot_received_ = 0;
-    not_logged_.clear();
-  }
-  if (!delivery.any_mesh) return;
-
-  if (delivery.snapshot_blocks != 0) snapshot_blocks_ = delivery.snapshot_blocks;
-  snapshot_received_ += delivery.blocks.size();
-  for (auto& [key, block] : delivery.blocks) scene_.replace(std::move(block));
-  received_seq_ = delivery.room_seq;
-  not_logged_.insert(not_logged_.end(), delivery.arrivals.begin(), delivery.arrivals.end());
-  if (delivery.snapshot_complete && !surface_complete_) {
-    scene_.end_snapshot();
-    surface_complete_ = true;
-    dirty_ = true;
-  }
-  // Until the whole surface was received, the picture shows the surface before it, or the progress of the first one.
-  if (surface_complete_) {
-    rebuild();
-  } else {
-    dirty_ = true;
-  }
-}
-
-void Viewer::rebuild() {
-  const auto begin = Clock::now();
-  const std::vector<RegionKey> regions = scene_.take_dirty();
-  if (regions.empty()) return;
-  for (const RegionKey& region : regions) window_->show_region(region, scene_.region_mesh(region));
-  regions_rebuilt_ += regions.size();
-  update_times_.record(Clock::now() - begin);
+  window_->scene().look(held_by_cap(window_->scene().camera(), push, twist, dt_s));
   dirty_ = true;
 }
 
@@ -149,19 +105,19 @@ void Viewer::meet_people() {
   const Result<PersonSeen> person = people_.find(followed_, PeopleView::Fit::looking);
   if (!person || !person->look || person->look == look_taken_) return;
   look_taken_ = person->look;
-  window_->look(looking_as(*person->look, window_->camera()));
+  window_->scene().look(looking_as(*person->look, window_->scene().camera()));
   dirty_ = true;
 }
 
 void Viewer::show_people(Clock::time_point now) {
   if (people_.annotations() != drawn_) {
     drawn_ = people_.annotations();
-    window_->show_annotations(drawn_);
+    window_->scene().show_annotations(drawn_);
     dirty_ = true;
   }
   if (auto names = people_.names(); names != names_) {
     names_ = std::move(names);
-    window_->show_names(names_);
+    window_->scene().show_names(names_);
     dirty_ = true;
   }
   auto said = people_.notices(now);
@@ -169,7 +125,7 @@ void Viewer::show_people(Clock::time_point now) {
   if (said == said_ && holding == holding_) return;
   said_ = std::move(said);
   holding_ = std::move(holding);
-  window_->show_words(said_, holding_);
+  window_->scene().show_words(said_, holding_);
   dirty_ = true;
 }
 
@@ -186,24 +142,23 @@ void Viewer::draw_by_hand(const WindowEvents& events) {
 
 std::string Viewer::notice() const {
   if (interrupted_) return options_.case_title + "\nconnection lost, trying again";
-  if (!surface_complete_ && snapshot_blocks_ != 0) {
-    const std::size_t per_cent = std::min<std::size_t>(99, 100 * snapshot_received_ / snapshot_blocks_);
-    return options_.case_title + "\nreceiving the surface, " + std::to_string(per_cent) + " %";
-  }
+  if (const auto percent = scene_.percent_received())
+    return options_.case_title + "\nreceiving the surface, " + std::to_string(*percent) + " %";
   return options_.case_title;
 }
 
 void Viewer::draw_if_due(bool at_once) {
   if (dirty_ && (at_once || Clock::now() >= next_draw_)) draw_now();
   // Events that did not change the picture are already shown by the present picture.
-  if (!dirty_ && surface_shown_ && !not_logged_.empty()) log_shown(mono_ns(Clock::now()));
+  if (!dirty_ && surface_shown_ && scene_.any_arrivals()) log_shown(mono_ns(Clock::now()));
 }
 
 void Viewer::draw_now() {
   const auto begin = Clock::now();
-  const bool with_tool = tool_shown_ && !states_.empty();
-  window_->show_tools(with_tool ? std::span<const CuttingState>(states_) : std::span<const CuttingState>{});
-  window_->show_text(with_tool ? gauge_text(states_.front()) : std::string{}, notice());
+  const auto states = scene_.states();
+  const bool with_tool = tool_shown_ && !states.empty();
+  window_->scene().show_tools(with_tool ? states : std::span<const CuttingState>{});
+  window_->scene().show_text(with_tool ? gauge_text(states.front()) : std::string{}, notice());
   window_->draw();
   const auto end = Clock::now();
 
@@ -211,21 +166,21 @@ void Viewer::draw_now() {
   ++frames_;
   // Where drawing is slow, leave a fifth of the time to the other programs of this machine.
   next_draw_ = std::max(begin + kFramePeriod, end + (end - begin) / 4);
-  if (!surface_complete_) return;
+  if (!scene_.complete()) return;
   frame_times_.record(end - begin);
   surface_shown_ = true;
   log_shown(mono_ns(end));
 }
 
 void Viewer::log_shown(std::int64_t rendered_mono_ns) {
-  shown_seq_ = received_seq_;
+  shown_seq_ = scene_.received_seq();
+  const std::vector<Arrival> arrivals = scene_.take_arrivals();
   if (frame_log_.is_open()) {
-    for (const Arrival& arrival : not_logged_) {
+    for (const Arrival& arrival : arrivals) {
       frame_log_ << arrival.room_seq.value << ',' << arrival.received_mono_ns << ',' << rendered_mono_ns << '\n';
     }
     frame_log_.flush();
   }
-  not_logged_.clear();
 }
 
 Result<Viewer::State> Viewer::obey_script() {
@@ -279,10 +234,11 @@ std::optional<Result<void>> Viewer::obey(const Command& command) {
             return surface_shown_ && shown_seq_ >= wait.room_seq ? Answer(Result<void>{}) : Answer{};
           },
           [&](const WaitForBodies& wait) {
-            return surface_shown_ && !dirty_ && bodies_.size() == wait.count ? Answer(Result<void>{}) : Answer{};
+            return surface_shown_ && !dirty_ && scene_.bodies().size() == wait.count ? Answer(Result<void>{})
+                                                                                     : Answer{};
           },
           [&](const WaitForItems& wait) {
-            return surface_shown_ && !dirty_ && items_.size() == wait.count ? Answer(Result<void>{}) : Answer{};
+            return surface_shown_ && !dirty_ && scene_.items().size() == wait.count ? Answer(Result<void>{}) : Answer{};
           },
           [&](const RoomRequest& request) { return obey_room(request); },
           [&](const WaitForDrawn& wait) {
@@ -294,18 +250,18 @@ std::optional<Result<void>> Viewer::obey(const Command& command) {
           [&](const WipeOff&) { return obey_people(command); },
           [&](const Say&) { return obey_people(command); },
           [&](const LookAtWhole&) {
-            window_->look(overview(options_.bounds));
+            window_->scene().look(overview(options_.bounds));
             return done();
           },
           [&](const LookFrom& look) {
-            window_->look(look.view);
+            window_->scene().look(look.view);
             return done();
           },
           [&](const LookAtTool& look) {
-            if (states_.empty()) {
+            if (scene_.states().empty()) {
               return Answer(failure(ErrorCode::unavailable, "there is no tool in the room to look at yet"));
             }
-            window_->look(beside_tool(states_.front().pose_bone_tool, look.distance_mm));
+            window_->scene().look(beside_tool(scene_.states().front().pose_bone_tool, look.distance_mm));
             return done();
           },
           [&](const ShowTool& show) {
@@ -315,7 +271,7 @@ std::optional<Result<void>> Viewer::obey(const Command& command) {
           [&](const SaveScreenshot& save) {
             draw_if_due(true);
             dirty_ = true;  // the next picture is a live one again
-            return Answer(window_->save_png(save.file));
+            return Answer(window_->scene().save_png(save.file));
           },
           [&](const SaveStatus& save) { return Answer(write_file(save.file, summary_json())); },
           [&](const Quit&) { return Answer(Result<void>{}); },
@@ -352,7 +308,7 @@ Result<void> Viewer::look_as(const std::string& who) {
   if (!person->look)
     return failure(ErrorCode::unavailable, "nobody knows where " + who + " looks: they have no window open");
   look_taken_ = person->look;
-  window_->look(looking_as(*person->look, window_->camera()));
+  window_->scene().look(looking_as(*person->look, window_->scene().camera()));
   dirty_ = true;
   return {};
 }
@@ -409,9 +365,9 @@ std::string Viewer::summary_json() const {
                                   {"max", times.max_us() / 1000.0}};
   };
   nlohmann::ordered_json bodies = nlohmann::ordered_json::array();
-  for (const BodyId body : bodies_) bodies.push_back(body.value);
+  for (const BodyId body : scene_.bodies()) bodies.push_back(body.value);
   nlohmann::ordered_json standing = nlohmann::ordered_json::array();
-  for (const SceneItem& item : items_) {
+  for (const SceneItem& item : scene_.items()) {
     const Vec3 &at = item.pose_bone_item.position_mm, along = item.pose_bone_item.direction(Vec3::UnitZ());
     standing.push_back({{"item", item.id},
                         {"body", item.body.value},
@@ -421,16 +377,17 @@ std::string Viewer::summary_json() const {
                         {"turns", item.turns},
                         {"seated", item.seated}});
   }
-  const CameraView camera = window_->camera();
+  const CameraView camera = window_->scene().camera();
+  const SurfaceScene& surface = scene_.surface();
   const auto numbers = [](const Vec3& v) { return nlohmann::ordered_json{v.x(), v.y(), v.z()}; };
   const nlohmann::ordered_json summary{
-      {"blocks", scene_.blocks()},
-      {"regions", scene_.regions()},
-      {"triangles", scene_.triangles()},
-      {"scene_mesh_hash", to_hex(scene_.hash())},
+      {"blocks", surface.blocks()},
+      {"regions", surface.regions()},
+      {"triangles", surface.triangles()},
+      {"scene_mesh_hash", to_hex(surface.hash())},
       {"room_seq", shown_seq_.value},
       {"bodies", bodies},
-      {"items", items_.size()},
+      {"items", scene_.items().size()},
       {"standing", standing},
       {"camera", {{"eye_mm", numbers(camera.eye_mm)}, {"target_mm", numbers(camera.target_mm)}}},
       {"drawn", drawn_.size()},
@@ -438,9 +395,9 @@ std::string Viewer::summary_json() const {
       {"holding", holding_},
       {"frames", frames_},
       {"frame_ms", milliseconds(frame_times_)},
-      {"update_ms", milliseconds(update_times_)},
-      {"updates", update_times_.count()},
-      {"regions_rebuilt", regions_rebuilt_},
+      {"update_ms", milliseconds(scene_.update_times())},
+      {"updates", scene_.update_times().count()},
+      {"regions_rebuilt", scene_.regions_rebuilt()},
   };
   return summary.dump(2) + "\n";
 }

@@ -14,6 +14,7 @@
 #include "common/geometry/lattice.hpp"
 #include "common/input/space_mouse_report.hpp"
 #include "common/runtime/tick_stats.hpp"
+#include "viewer_client/app/scene_updater.hpp"
 #include "viewer_client/app/script.hpp"
 #include "viewer_client/render/window.hpp"
 #include "viewer_client/scene/people_view.hpp"
@@ -56,9 +57,7 @@ class Viewer {
   Viewer(const ViewerOptions& options, BoneWindow& window, RenderQueue& render_queue,
          std::optional<ScriptReader> script);
 
-  void receive();
   void follow_cap();
-  void rebuild();
   void meet_people();
   void show_people(std::chrono::steady_clock::time_point now);
   void draw_by_hand(const WindowEvents& events);
@@ -85,18 +84,12 @@ class Viewer {
   std::chrono::steady_clock::time_point capped_;  // when the SpaceMouse was last read
   std::uint32_t cap_buttons_ = 0;
 
-  SurfaceScene scene_;
-  std::vector<CuttingState> states_;
-  std::vector<SceneItem> items_;
-  std::vector<BodyId> bodies_;
+  SceneUpdater scene_;
   std::optional<RoomAnswer> asked_;  // the answer to the pending command
   bool tool_shown_ = true;
   bool interrupted_ = false;
-  bool surface_complete_ = false;  // the whole surface was received
-  bool surface_shown_ = false;     // and drawn
-  std::size_t snapshot_blocks_ = 0, snapshot_received_ = 0;
-  RoomSeq received_seq_, shown_seq_;
-  std::vector<Arrival> not_logged_;
+  bool surface_shown_ = false;  // the whole surface was drawn
+  RoomSeq shown_seq_;
 
   PeopleView people_;
   std::chrono::steady_clock::time_point next_meeting_{};
@@ -115,8 +108,8 @@ class Viewer {
 
   bool dirty_ = true;
   std::chrono::steady_clock::time_point next_draw_{};
-  DurationHistogram frame_times_, update_times_;
-  std::uint64_t frames_ = 0, regions_rebuilt_ = 0;
+  DurationHistogram frame_times_;
+  std::uint64_t frames_ = 0;
 };
 
 }  // namespace osteon

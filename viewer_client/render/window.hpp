@@ -1,22 +1,12 @@
-// One window with the bone, the tools and a line of gauges. It hides VTK from the rest of the program. All functions:
-// [render], the thread that opened the window.
+// A window of its own with a scene of the bone, for scripts and observers. All functions: [render], the thread that
+// opened the window.
 #pragma once
-#include <filesystem>
-#include <map>
 #include <memory>
-#include <optional>
-#include <span>
 #include <string>
-#include <vector>
 
 #include "common/core/result.hpp"
-#include "common/mechanics/cutting_state.hpp"
-#include "common/tools/annotation.hpp"
-#include "common/tools/scene_item.hpp"
-#include "viewer_client/render/image.hpp"
+#include "viewer_client/render/bone_scene.hpp"
 #include "viewer_client/render/window_input.hpp"
-#include "viewer_client/scene/camera_view.hpp"
-#include "viewer_client/scene/surface_scene.hpp"
 
 namespace osteon {
 
@@ -32,36 +22,9 @@ class BoneWindow {
   [[nodiscard]] static Result<std::unique_ptr<BoneWindow>> open(const WindowOptions& options);
   ~BoneWindow();
 
-  // The region's whole mesh, bone frame. An empty mesh removes the region from the picture.
-  void show_region(const RegionKey& region, const Mesh& mesh);
-  // The tools of the room. Tools that are not in the list vanish. A translucent ghost shows the pose of the user's hand
-  // where it differs from the tool.
-  void show_tools(std::span<const CuttingState> states);
-  // Adds a tool that is not built in, as the room defines it. From then on states and items may name it.
-  void learn_tool(const Tool& tool);
-  // The items on the bone. Items that are not in the list vanish.
-  void show_items(std::span<const SceneItem> items);
-  void show_text(const std::string& gauges, const std::string& notice);
-  // The annotations of the room. Annotations that are not in the list vanish.
-  void show_annotations(std::span<const Annotation> drawn);
-  // Each tool shows the name of its person.
-  void show_names(std::map<AuthorId, std::string> names);
-  // What was said, one line for each person's text, and the restrictions of one's own hand, in lines.
-  void show_words(const std::vector<std::string>& said, const std::string& holding);
-
-  // The point of the bone at a pixel, bone frame. Columns from the left, rows from the top.
-  [[nodiscard]] std::optional<Vec3> surface_at(int x_px, int y_px) const;
-
-  void look(const CameraView& view);
-  [[nodiscard]] CameraView camera() const;
-
+  [[nodiscard]] BoneScene& scene();
+  // Draws the scene, with the hint and the line of the user's mouse.
   void draw();
-  // Draws once more with soft shadows in hollows, and saves that picture. A live picture in software has no time for
-  // such shadows.
-  [[nodiscard]] Result<void> save_png(const std::filesystem::path& file);
-  // The picture of the last draw().
-  [[nodiscard]] Image image() const;
-
   // Handles the events that the window system has sent.
   [[nodiscard]] WindowEvents events();
 

@@ -39,6 +39,56 @@ CameraView looking_as(const ViewFrustum& look, const CameraView& now) {
   return view;
 }
 
+namespace {
+
+// Columns: right, up and to the eye, in the bone's frame. `back`: from the target to the eye, not zero.
+Eigen::Matrix3d picture_axes(const CameraView& view, const Vec3& back) {
+  Eigen::Matrix3d seen;
+  seen.col(2) = back.normalized();
+  seen.col(1) = across(view.up, seen.col(2), across(Vec3::UnitZ(), seen.col(2), Vec3::UnitX()));
+  seen.col(0) = seen.col(1).cross(seen.col(2));
+  return seen;
+}
+
+}  // namespace
+
+SightRay ray_through(const CameraView& view, int width_px, int height_px, int x_px, int y_px) {
+  const Vec3 back = view.eye_mm - view.target_mm;
+  if (!(back.norm() > kLeastSight_mm)) return {view.eye_mm, Vec3::UnitY()};
+  const double per_px = 2.0 * std::tan(0.5 * view.view_angle_rad) / height_px;
+  const Vec3 seen(per_px * (x_px + 0.5 - 0.5 * width_px), per_px * (0.5 * height_px - y_px - 0.5), -1.0);
+  return {view.eye_mm, (picture_axes(view, back) * seen).normalized()};
+}
+
+CameraView orbited(const CameraView& view, double right_rad, double up_rad) {
+  const Vec3 back = view.eye_mm - view.target_mm;
+  if (!(back.norm() > kLeastSight_mm)) return view;
+  const Eigen::Matrix3d seen = picture_axes(view, back);
+  const Eigen::Quaterniond turn =
+      Eigen::AngleAxisd(-right_rad, Vec3(seen.col(1))) * Eigen::AngleAxisd(up_rad, Vec3(seen.col(0)));
+  CameraView turned = view;
+  turned.eye_mm = view.target_mm + turn * back;
+  turned.up = turn * Vec3(seen.col(1));
+  return turned;
+}
+
+CameraView shifted(const CameraView& view, double right, double up) {
+  const Vec3 back = view.eye_mm - view.target_mm;
+  if (!(back.norm() > kLeastSight_mm)) return view;
+  const double height_mm = 2.0 * std::tan(0.5 * view.view_angle_rad) * back.norm();
+  const Vec3 aside = picture_axes(view, back) * Vec3(-right * height_mm, -up * height_mm, 0.0);
+  CameraView moved = view;
+  moved.eye_mm += aside;
+  moved.target_mm += aside;
+  return moved;
+}
+
+CameraView zoomed(const CameraView& view, double factor) {
+  CameraView nearer = view;
+  nearer.eye_mm = view.target_mm + factor * (view.eye_mm - view.target_mm);
+  return nearer;
+}
+
 CameraView overview(const Box& bone) {
   CameraView view;
   view.target_mm = 0.5 * (bone.min_mm + bone.max_mm);
@@ -69,10 +119,7 @@ CameraView held_by_cap(const CameraView& view, const Vec3& push, const Vec3& twi
   const Vec3 back = view.eye_mm - view.target_mm;
   const double distance_mm = back.norm();
   if (!(distance_mm > 0.0)) return view;
-  Eigen::Matrix3d seen;  // columns: right, up and to the eye, in the bone's frame
-  seen.col(2) = back / distance_mm;
-  seen.col(1) = across(view.up, seen.col(2), across(Vec3::UnitZ(), seen.col(2), Vec3::UnitX()));
-  seen.col(0) = seen.col(1).cross(seen.col(2));
+  const Eigen::Matrix3d seen = picture_axes(view, back);
 
   CameraView moved = view;
   const double angle = kRadPerSecond * dt_s * twist.norm();

@@ -21,6 +21,20 @@ struct CameraView {
 // this window's own view.
 [[nodiscard]] CameraView looking_as(const ViewFrustum& look, const CameraView& now);
 
+// A ray from the eye through a pixel, bone frame; the direction is a unit vector. Columns from the left, rows from the
+// top; the pixel's middle.
+struct SightRay {
+  Vec3 from_mm, direction;
+};
+[[nodiscard]] SightRay ray_through(const CameraView& view, int width_px, int height_px, int x_px, int y_px);
+
+// The view turned about its target, as by dragging the bone: radians about the picture's vertical and horizontal axis.
+[[nodiscard]] CameraView orbited(const CameraView& view, double right_rad, double up_rad);
+// The view moved aside by fractions of the picture's height, so that what is dragged stays under the pointer.
+[[nodiscard]] CameraView shifted(const CameraView& view, double right, double up);
+// The view at `factor` times the distance from its target.
+[[nodiscard]] CameraView zoomed(const CameraView& view, double factor);
+
 // The whole bone from the front, from its left and slightly above (DICOM LPS: +x left, -y front, +z up).
 [[nodiscard]] CameraView overview(const Box& bone);
 

@@ -19,6 +19,7 @@ void RenderQueue::begin_stream() {
 
 void RenderQueue::put_mesh(RoomSeq room_seq, std::vector<ReceivedBlock> blocks, bool snapshot_complete,
                            std::uint32_t snapshot_blocks, std::int64_t received_mono_ns) {
+  bool first = false;
   {
     const MutexLock lock(mutex_);
     for (ReceivedBlock& block : blocks) {
@@ -31,9 +32,9 @@ void RenderQueue::put_mesh(RoomSeq room_seq, std::vector<ReceivedBlock> blocks, 
     next_.any_mesh = true;
     if (next_.arrivals.size() == kMostArrivals) next_.arrivals.erase(next_.arrivals.begin());
     next_.arrivals.push_back({room_seq, received_mono_ns});
-    waiting_ = true;
+    first = !std::exchange(waiting_, true);
   }
-  arrived_.notify_one();
+  announce(first);
 }
 
 void RenderQueue::put_tool(Tool tool) {
@@ -43,15 +44,21 @@ void RenderQueue::put_tool(Tool tool) {
 
 void RenderQueue::put_states(std::vector<CuttingState> states, std::vector<SceneItem> items,
                              std::vector<BodyId> bodies) {
+  bool first = false;
   {
     const MutexLock lock(mutex_);
     next_.states = std::move(states);
     next_.items = std::move(items);
     next_.bodies = std::move(bodies);
     next_.any_states = true;
-    waiting_ = true;
+    first = !std::exchange(waiting_, true);
   }
+  announce(first);
+}
+
+void RenderQueue::announce(bool first) {
   arrived_.notify_one();
+  if (first && wake_) wake_();
 }
 
 Delivery RenderQueue::take() {

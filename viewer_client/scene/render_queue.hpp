@@ -3,7 +3,9 @@
 #pragma once
 #include <chrono>
 #include <cstdint>
+#include <functional>
 #include <map>
+#include <utility>
 #include <vector>
 
 #include "common/core/id.hpp"
@@ -46,13 +48,20 @@ class RenderQueue {
   void put_states(std::vector<CuttingState> states, std::vector<SceneItem> items = {}, std::vector<BodyId> bodies = {});
   void put_tool(Tool tool);
 
+  // Called by the thread that put data, once until the next take(). It must return at once. Call this before data
+  // comes.
+  void set_wake(std::function<void()> wake) { wake_ = std::move(wake); }
+
   [[nodiscard]] Delivery take();
   // Returns early if data is waiting.
   void wait_for(std::chrono::milliseconds time);
 
  private:
+  void announce(bool first);
+
   Mutex mutex_{LockRank::leaf};
   CondVar arrived_;
+  std::function<void()> wake_;  // set before the network threads start
   bool waiting_ OSTEON_GUARDED_BY(mutex_) = false;
   Delivery next_ OSTEON_GUARDED_BY(mutex_);
 };

@@ -1,10 +1,54 @@
 #include "viewer_client/scene/surface_scene.hpp"
 
 #include <algorithm>
+#include <limits>
 #include <map>
 #include <utility>
 
 namespace osteon {
+
+namespace {
+
+Vec3 vertex(const Mesh& mesh, std::uint32_t index) {
+  const auto& p = mesh.positions_mm[index];
+  return {p[0], p[1], p[2]};
+}
+
+Box bounds_of(const Mesh& mesh) {
+  Box box{Vec3::Constant(std::numeric_limits<double>::infinity()),
+          Vec3::Constant(-std::numeric_limits<double>::infinity())};
+  for (std::uint32_t i = 0; i < mesh.positions_mm.size(); ++i) {
+    box.min_mm = box.min_mm.cwiseMin(vertex(mesh, i));
+    box.max_mm = box.max_mm.cwiseMax(vertex(mesh, i));
+  }
+  return box;
+}
+
+// Whether a ray meets the box at a distance below `most_mm`.
+bool meets(const Box& box, const Vec3& from_mm, const Vec3& inverse, double most_mm) {
+  const Vec3 a = (box.min_mm - from_mm).cwiseProduct(inverse), b = (box.max_mm - from_mm).cwiseProduct(inverse);
+  const double enters = std::max(0.0, a.cwiseMin(b).maxCoeff()), leaves = a.cwiseMax(b).minCoeff();
+  return enters <= leaves && enters < most_mm;
+}
+
+// The distance along a ray to a triangle that it enters from the front. None: it does not.
+std::optional<double> distance_to(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& from_mm,
+                                  const Vec3& direction) {
+  const Vec3 ab = b - a, ac = c - a, normal = ab.cross(ac);
+  const double slope = normal.dot(direction);
+  if (!(slope < 0.0)) return std::nullopt;
+  const double distance = (a - from_mm).dot(normal) / slope;
+  if (!(distance >= 0.0)) return std::nullopt;
+  // A point on an edge belongs to both triangles, so that no ray slips between them.
+  constexpr double kEdge = -1e-9;
+  const Vec3 in = from_mm + distance * direction - a;
+  const double size = normal.squaredNorm();
+  const double v = in.cross(ac).dot(normal) / size, w = ab.cross(in).dot(normal) / size;
+  if (v < kEdge || w < kEdge || v + w > 1.0 - kEdge) return std::nullopt;
+  return distance;
+}
+
+}  // namespace
 
 RegionKey region_of(const BlockKey& key) { return {key.body, key.level, shift_down(key.index, kRegionShift)}; }
 
@@ -31,6 +75,7 @@ bool SurfaceScene::replace(ReceivedBlock received) {
   count(block, -1);
   block.mesh_hash = received.mesh_hash;
   block.mesh = std::move(received.mesh);
+  block.bounds = bounds_of(block.mesh);
   count(block, +1);
   dirty_.insert(region);
   return true;
@@ -90,6 +135,39 @@ Mesh SurfaceScene::region_mesh(const RegionKey& region) const {
   }
   if (!whole.tissue.empty()) whole.tissue.resize(vertices);
   return whole;
+}
+
+std::optional<SurfaceHit> SurfaceScene::first_hit(const Vec3& from_mm, const Vec3& direction) const {
+  const Vec3 inverse = direction.cwiseInverse();
+  double nearest_mm = std::numeric_limits<double>::infinity();
+  std::optional<SurfaceHit> hit;
+  for (const auto& [region, blocks] : regions_)
+    for (const auto& [key, block] : blocks) {
+      if (block.mesh.triangles.empty() || !meets(block.bounds, from_mm, inverse, nearest_mm)) continue;
+      for (const auto& [i, j, k] : block.mesh.triangles) {
+        const Vec3 a = vertex(block.mesh, i), b = vertex(block.mesh, j), c = vertex(block.mesh, k);
+        const std::optional<double> distance = distance_to(a, b, c, from_mm, direction);
+        if (!distance || *distance >= nearest_mm) continue;
+        nearest_mm = *distance;
+        hit = SurfaceHit{from_mm + nearest_mm * direction, (b - a).cross(c - a).normalized(), key.body};
+      }
+    }
+  return hit;
+}
+
+std::optional<Vec3> SurfaceScene::mean_normal(const Vec3& point_mm, double radius_mm) const {
+  Vec3 sum = Vec3::Zero();
+  for (const auto& [region, blocks] : regions_)
+    for (const auto& [key, block] : blocks) {
+      if (block.mesh.triangles.empty() || (point_mm - block.bounds.min_mm).minCoeff() < -radius_mm ||
+          (block.bounds.max_mm - point_mm).minCoeff() < -radius_mm)
+        continue;
+      for (const auto& [i, j, k] : block.mesh.triangles) {
+        const Vec3 a = vertex(block.mesh, i), b = vertex(block.mesh, j), c = vertex(block.mesh, k);
+        if (((a + b + c) / 3.0 - point_mm).norm() <= radius_mm) sum += (b - a).cross(c - a);
+      }
+    }
+  return sum.norm() > 0.0 ? std::optional(Vec3(sum.normalized())) : std::nullopt;
 }
 
 std::size_t SurfaceScene::regions() const {

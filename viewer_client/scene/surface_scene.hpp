@@ -2,11 +2,14 @@
 #pragma once
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <set>
 #include <vector>
 
 #include "common/core/digest.hpp"
 #include "common/core/id.hpp"
+#include "common/geometry/lattice.hpp"
+#include "common/geometry/pose.hpp"
 #include "common/surface/mesh_block.hpp"
 
 namespace osteon {
@@ -32,6 +35,12 @@ struct RegionKey {
 
 [[nodiscard]] RegionKey region_of(const BlockKey& key);
 
+struct SurfaceHit {
+  Vec3 point_mm;  // bone frame
+  Vec3 normal;    // unit, out of the bone
+  BodyId body;
+};
+
 // [render]
 class SurfaceScene {
  public:
@@ -49,6 +58,12 @@ class SurfaceScene {
   // All triangles of a region as one mesh, blocks in the order of their keys. Empty if nothing is left.
   [[nodiscard]] Mesh region_mesh(const RegionKey& region) const;
 
+  // The first point of the surface on a ray, from outside. `direction`: unit vector, bone frame. None: it meets no
+  // bone.
+  [[nodiscard]] std::optional<SurfaceHit> first_hit(const Vec3& from_mm, const Vec3& direction) const;
+  // The mean outer normal of the triangles within `radius_mm` of a point, weighted by area. None: no triangle is near.
+  [[nodiscard]] std::optional<Vec3> mean_normal(const Vec3& point_mm, double radius_mm) const;
+
   [[nodiscard]] std::size_t blocks() const { return drawn_blocks_; }  // with triangles
   [[nodiscard]] std::size_t triangles() const { return triangles_; }
   [[nodiscard]] std::size_t regions() const;  // with triangles
@@ -62,6 +77,7 @@ class SurfaceScene {
     std::uint64_t snapshot = 0;  // in which it was last received
     Digest mesh_hash;
     Mesh mesh;
+    Box bounds;  // of the mesh
   };
   using Region = std::map<BlockKey, Block>;
 

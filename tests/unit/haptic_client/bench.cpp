@@ -55,18 +55,21 @@ Bench::Bench(const Case& bone, const std::vector<PlanStep>& plan, const Simulate
 
 Bench::Bench(const Case& bone, ReadyPlan plan, const SimulatedDeviceParams& device, double force_scale,
              const BenchDelays& delays, double dt_s)
-    : delays_(delays), session_(std::move(plan), device, force_scale, dt_s), replica_(bone, BodyId{}) {}
+    : Bench(bone, std::make_unique<SimulatedSession>(std::move(plan), device, force_scale, dt_s), delays) {}
+
+Bench::Bench(const Case& bone, std::unique_ptr<Session> session, const BenchDelays& delays)
+    : delays_(delays), session_(std::move(session)), replica_(bone, BodyId{}) {}
 
 SessionTick Bench::tick(int periods) {
-  last_ = session_.tick(patch_, RoomLink::follows, periods);
+  last_ = session_->tick(patch_, RoomLink::follows, periods);
   ++ticks_;
   return last_;
 }
 
 void Bench::follow() {
   CutPiece piece;
-  while (session_.loop().take_piece(piece)) {
-    const Cut cut = cut_of(piece, session_.loop().tool(piece.tool), AuthorId{1}, 0);
+  while (session_->loop().take_piece(piece)) {
+    const Cut cut = cut_of(piece, session_->loop().tool(piece.tool), AuthorId{1}, 0);
     replica_.add_own(cut);
     cuts_.push_back(cut);
     on_the_way_.emplace_back(ticks_ + delays_.commit_ticks, cut);
@@ -78,14 +81,14 @@ void Bench::follow() {
   if (ticks_ % delays_.patch_ticks != 0) return;
   for (const ChangedLeaves& change : replica_.take_changes())
     builder_.changed(replica_.predicted().bone().pitch_mm(), change.level, change.origins);
-  builder_.build(replica_.predicted(), session_.loop().tool(last_.report.tool), last_.report.pose_bone_proxy, patch_);
+  builder_.build(replica_.predicted(), session_->loop().tool(last_.report.tool), last_.report.pose_bone_proxy, patch_);
   patch_.own_cuts = replica_.last_own();
   patch_.room_seq = replica_.room_seq();
 }
 
 void Bench::run(const std::function<void(const SessionTick&)>& after_tick) {
   constexpr std::int64_t kMostTicks = 200000;
-  while (!session_.done() && ticks_ < kMostTicks) {
+  while (!session_->done() && ticks_ < kMostTicks) {
     const SessionTick now = tick();
     if (after_tick) after_tick(now);
     follow();

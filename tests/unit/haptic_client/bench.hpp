@@ -2,6 +2,7 @@
 #pragma once
 #include <deque>
 #include <functional>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -31,6 +32,9 @@ class Bench {
   Bench(const Case& bone, ReadyPlan plan, const SimulatedDeviceParams& device = {}, double force_scale = 0.0,
         const BenchDelays& delays = {}, double dt_s = 1e-3);
 
+  // Any other session.
+  Bench(const Case& bone, std::unique_ptr<Session> session, const BenchDelays& delays = {});
+
   // Runs one tick of `dt_s`, `periods` ticks after the last. `after_tick` sees the result before replica and patches
   // are updated.
   SessionTick tick(int periods = 1);
@@ -38,14 +42,15 @@ class Bench {
   void run(const std::function<void(const SessionTick&)>& after_tick = {});
   void follow();  // updates replica and patch, as their thread would
 
-  [[nodiscard]] SimulatedSession& session() { return session_; }
+  // Only of a bench with a plan.
+  [[nodiscard]] SimulatedSession& session() { return static_cast<SimulatedSession&>(*session_); }
   [[nodiscard]] const Replica& replica() const { return replica_; }
   [[nodiscard]] const Patch& patch() const { return patch_; }
   [[nodiscard]] const std::vector<Cut>& cuts() const { return cuts_; }
 
  private:
   BenchDelays delays_;
-  SimulatedSession session_;
+  std::unique_ptr<Session> session_;
   Replica replica_;
   PatchBuilder builder_;
   Patch patch_;

@@ -31,7 +31,7 @@ class BonePicture : public test::Picture {};
 
 TEST_F(BonePicture, ASphereCoversItsOutline) {
   const Image empty = drawn();
-  window_->show_region(kHere, sphere_mesh(Vec3::Zero(), 15.0, 0));
+  window_->scene().show_region(kHere, sphere_mesh(Vec3::Zero(), 15.0, 0));
   const Image image = drawn();
   ASSERT_EQ(image.width_px, kWidth);
   ASSERT_EQ(image.height_px, kHeight);
@@ -51,19 +51,19 @@ TEST_F(BonePicture, ASphereCoversItsOutline) {
 
 TEST_F(BonePicture, WhatIsRemovedLeavesBackground) {
   const Image empty = drawn();
-  window_->show_region(kHere, sphere_mesh(Vec3(-15, 0, 0), 8.0, 0));
+  window_->scene().show_region(kHere, sphere_mesh(Vec3(-15, 0, 0), 8.0, 0));
   const Image one = drawn();
-  window_->show_region(kThere, sphere_mesh(Vec3(15, 0, 0), 8.0, 0));
+  window_->scene().show_region(kThere, sphere_mesh(Vec3(15, 0, 0), 8.0, 0));
   EXPECT_GT(differing_pixels(drawn(), one), 500);
-  window_->show_region(kThere, {});
+  window_->scene().show_region(kThere, {});
   EXPECT_EQ(differing_pixels(drawn(), one), 0);
-  window_->show_region(kHere, {});
+  window_->scene().show_region(kHere, {});
   EXPECT_EQ(differing_pixels(drawn(), empty), 0);
 }
 
 TEST_F(BonePicture, CutFacesAreRedder) {
-  window_->show_region(kHere, sphere_mesh(Vec3(-15, 0, 0), 10.0, 0));
-  window_->show_region(kThere, sphere_mesh(Vec3(15, 0, 0), 10.0, 1));
+  window_->scene().show_region(kHere, sphere_mesh(Vec3(-15, 0, 0), 10.0, 0));
+  window_->scene().show_region(kThere, sphere_mesh(Vec3(15, 0, 0), 10.0, 1));
   const Image image = drawn();
   const int offset = static_cast<int>(focal_px(from_front(100.0)) * 15.0 / 100.0);
   const Vec3 imported = colour(image, kWidth / 2 - offset, kHeight / 2);
@@ -94,15 +94,15 @@ TEST_F(BonePicture, MetalAndEnamelHaveColoursOfTheirOwn) {
     gather_block(field, blocks, key, 0.5, samples);
     const auto mesh = decode_block(key, encode_block(samples), level_pitch_mm(0.5, key.level));
     ASSERT_TRUE(mesh);
-    window_->show_region({BodyId{0}, 0, {region++, 0, 0}}, *mesh);
+    window_->scene().show_region({BodyId{0}, 0, {region++, 0, 0}}, *mesh);
   }
   CameraView view = from_front(90.0);
   view.target_mm = Vec3(0, -14, -6);
   view.eye_mm = Vec3(0, -90, -6);
-  window_->look(view);
+  window_->scene().look(view);
   const Image image = drawn();
   if (const char* folder = std::getenv("OSTEON_PICTURES")) {
-    ASSERT_TRUE(window_->save_png(std::string(folder) + "/metal.png"));
+    ASSERT_TRUE(window_->scene().save_png(std::string(folder) + "/metal.png"));
   }
   const double px_per_mm = focal_px(view) / 76.0;
   const auto seen = [&](double x_mm, double z_mm) {
@@ -122,13 +122,13 @@ TEST_F(BonePicture, MetalAndEnamelHaveColoursOfTheirOwn) {
 
 TEST_F(BonePicture, DoesNotDependOnTheOrderOfArrival) {
   // Two spheres of different colour at one position: the depth test cannot decide between them.
-  window_->show_region(kHere, sphere_mesh(Vec3::Zero(), 15.0, 0));
-  window_->show_region(kThere, sphere_mesh(Vec3::Zero(), 15.0, 1));
+  window_->scene().show_region(kHere, sphere_mesh(Vec3::Zero(), 15.0, 0));
+  window_->scene().show_region(kThere, sphere_mesh(Vec3::Zero(), 15.0, 1));
   const Image forwards = drawn();
-  window_->show_region(kHere, {});
-  window_->show_region(kThere, {});
-  window_->show_region(kThere, sphere_mesh(Vec3::Zero(), 15.0, 1));
-  window_->show_region(kHere, sphere_mesh(Vec3::Zero(), 15.0, 0));
+  window_->scene().show_region(kHere, {});
+  window_->scene().show_region(kThere, {});
+  window_->scene().show_region(kThere, sphere_mesh(Vec3::Zero(), 15.0, 1));
+  window_->scene().show_region(kHere, sphere_mesh(Vec3::Zero(), 15.0, 0));
   EXPECT_EQ(differing_pixels(drawn(), forwards), 0);
 }
 
@@ -139,17 +139,17 @@ TEST_F(SpherePicture, TheSurfaceUnderAPixelIsTheBonesNotTheTools) {
   state.author = AuthorId{7};
   state.tool_name = "burr-round-5";
   state.pose_bone_tool = state.pose_bone_device = pose_along(Vec3(0, -20, 0), -Vec3::UnitZ());
-  window_->show_tools(std::span(&state, 1));
+  window_->scene().show_tools(std::span(&state, 1));
   (void)drawn();
   for (const Vec3& point : {on_front(0.0, 0.0), on_front(0.5, 0.4), on_front(-0.6, -0.3)}) {
     const auto [x, y] = seen(point);
-    const auto at = window_->surface_at(x, y);
+    const auto at = window_->scene().surface_at(x, y);
     ASSERT_TRUE(at);
     // A pixel is 0.2 mm here. Facets lie up to 0.1 mm inside the sphere, more where the view is along the surface.
     EXPECT_LT((*at - point).norm(), 0.6) << at->transpose();
     EXPECT_NEAR(at->norm(), kRadius_mm, 0.1);
   }
-  EXPECT_FALSE(window_->surface_at(3, 3));
+  EXPECT_FALSE(window_->scene().surface_at(3, 3));
 }
 
 }  // namespace

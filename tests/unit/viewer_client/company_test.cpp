@@ -179,13 +179,13 @@ TEST_F(Company, TheHandBeforeTheWindowSeesWhatWasDecided) {
 
 TEST_F(Company, DrawingsOfOthersAreSeen) {
   EXPECT_EQ(why(obey("look at 0 0 0 from 0 -100 0 up 0 0 1\nwait drawn 0")), "ok");
-  const Image bare = window_->image();
+  const Image bare = window_->scene().image();
   Annotation line{.id = 1, .kind = AnnotationKind::line, .colour = 0x10e040};
   for (const double x : {-8.0, 8.0}) line.points.push_back(in_steps(Vec3(x, -16, 0)));
   room_.drawn = {line};
   EXPECT_EQ(why(obey("look at 0 0 0 from 0 -100 0 up 0 0 1\nwait drawn 1")), "ok");
-  EXPECT_GT(test::differing_pixels(window_->image(), bare), 200);
-  const Vec3 middle = colour(window_->image(), test::kWidth / 2, test::kHeight / 2);
+  EXPECT_GT(test::differing_pixels(window_->scene().image(), bare), 200);
+  const Vec3 middle = colour(window_->scene().image(), test::kWidth / 2, test::kHeight / 2);
   EXPECT_GT(middle.y(), 1.25 * middle.x());
 }
 

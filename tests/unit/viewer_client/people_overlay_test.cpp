@@ -33,7 +33,7 @@ Annotation mark(std::uint32_t id, AnnotationKind kind, const std::vector<Vec3>& 
 class PeoplePicture : public test::SpherePicture {
  protected:
   Image with(const std::vector<Annotation>& all) {
-    window_->show_annotations(all);
+    window_->scene().show_annotations(all);
     return drawn();
   }
   static int green_pixels(const Image& image) {
@@ -83,7 +83,7 @@ TEST_F(PeoplePicture, AnArrowEndsAtItsPointAndComesFromOutside) {
 TEST_F(PeoplePicture, AnArrowIsAsLongOnTheScreenFromFarAway) {
   const std::vector<Annotation> arrow{mark(4, AnnotationKind::pointer, {on_front(0.9, 0.0)})};
   const int near = green_pixels(with(arrow));
-  window_->look(from_front(5.0 * kFrom_mm));
+  window_->scene().look(from_front(5.0 * kFrom_mm));
   const int far = green_pixels(drawn());
   EXPECT_GT(far, near / 2);
   EXPECT_LT(far, 2 * near);
@@ -122,13 +122,13 @@ TEST_F(PeoplePicture, AToolIsNamedByItsPerson) {
   state.tool_name = "burr-round-5";
   state.pose_bone_tool = state.pose_bone_device = pose_along(Vec3(0, -20, 0), -Vec3::UnitZ());
   const Image before = with({mark(1, AnnotationKind::label, {on_front(-0.5, -0.5)}, "x")});
-  window_->show_tools(std::span(&state, 1));
+  window_->scene().show_tools(std::span(&state, 1));
   const Image nameless = drawn();
-  window_->show_names({{AuthorId{8}, "somebody else"}});
+  window_->scene().show_names({{AuthorId{8}, "somebody else"}});
   EXPECT_EQ(differing_pixels(drawn(), nameless), 0);
-  window_->show_names({{AuthorId{7}, "Ada"}});
+  window_->scene().show_names({{AuthorId{7}, "Ada"}});
   EXPECT_GT(differing_pixels(drawn(), nameless), 100);
-  window_->show_tools({});
+  window_->scene().show_tools({});
   EXPECT_EQ(differing_pixels(drawn(), before), 0);
 }
 
@@ -141,15 +141,15 @@ TEST_F(PeoplePicture, WordsStandBelowAndWhatHoldsAbove) {
           rows = {std::min(rows.first, row), std::max(rows.second, row)};
     return rows;
   };
-  window_->show_words({"Ada: done", "Dr. Berg: thank you"}, "");
+  window_->scene().show_words({"Ada: done", "Dr. Berg: thank you"}, "");
   const auto said = changed_rows(drawn());
   EXPECT_GT(said.first, kHeight / 2);
   EXPECT_GT(said.second - said.first, 30) << "two lines";
-  window_->show_words({}, "Your hand is stopped");
+  window_->scene().show_words({}, "Your hand is stopped");
   const auto holding = changed_rows(drawn());
   EXPECT_LT(holding.second, kHeight / 2);
   EXPECT_GE(holding.second, holding.first);
-  window_->show_words({}, "");
+  window_->scene().show_words({}, "");
   EXPECT_EQ(differing_pixels(drawn(), bare_), 0);
 }
 

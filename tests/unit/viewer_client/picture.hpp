@@ -43,7 +43,7 @@ class Picture : public testing::Test {
     auto window = BoneWindow::open({kWidth, kHeight, "picture test"});
     ASSERT_TRUE(window) << window.error().message;
     window_ = std::move(*window);
-    window_->look(from_front(100.0));
+    window_->scene().look(from_front(100.0));
   }
   void TearDown() override {
     window_.reset();
@@ -52,7 +52,7 @@ class Picture : public testing::Test {
 
   Image drawn() {
     window_->draw();
-    return window_->image();
+    return window_->scene().image();
   }
   // Mean colour of a square of 9 pixels round a position.
   static Vec3 colour(const Image& image, int x, int y) {
@@ -84,7 +84,7 @@ class SpherePicture : public Picture {
   void SetUp() override {
     Picture::SetUp();
     if (!window_) return;
-    window_->show_region({BodyId{0}, 0, {0, 0, 0}}, sphere_mesh(Vec3::Zero(), kRadius_mm, 0));
+    window_->scene().show_region({BodyId{0}, 0, {0, 0, 0}}, sphere_mesh(Vec3::Zero(), kRadius_mm, 0));
     bare_ = drawn();
   }
   // Where a point of the bone appears from the front: column and row.

@@ -50,10 +50,10 @@ TEST_F(ViewerLoop, TheLoopShowsWhatTheRenderQueueBrings) {
   render_queue.begin_stream();
   deliver(3, 15.0, false);
   EXPECT_FALSE(turns(8));
-  const Image before = window_->image();
+  const Image before = window_->scene().image();
   deliver(4, 15.0, true);
   EXPECT_FALSE(turns(8));
-  EXPECT_GT(differing_pixels(window_->image(), before), 1000);
+  EXPECT_GT(differing_pixels(window_->scene().image(), before), 1000);
   deliver(5, 18.0, true);
   EXPECT_TRUE(turns(100));
 

@@ -23,18 +23,18 @@ class Window : public test::Picture {};
 
 TEST_F(Window, TheCameraIsWhereItWasPut) {
   const CameraView view = from_front(321.0);
-  window_->look(view);
-  const CameraView back = window_->camera();
+  window_->scene().look(view);
+  const CameraView back = window_->scene().camera();
   EXPECT_NEAR((back.eye_mm - view.eye_mm).norm(), 0.0, 1e-9);
   EXPECT_NEAR((back.target_mm - view.target_mm).norm(), 0.0, 1e-9);
   EXPECT_NEAR(back.view_angle_rad, view.view_angle_rad, 1e-9);
 }
 
 TEST_F(Window, IsSavedAsPng) {
-  window_->show_region(kRegion, sphere_mesh(Vec3::Zero(), 15.0, 0));
+  window_->scene().show_region(kRegion, sphere_mesh(Vec3::Zero(), 15.0, 0));
   const test::TempDir folder;
   const auto file = folder / "picture.png";
-  ASSERT_TRUE(window_->save_png(file));
+  ASSERT_TRUE(window_->scene().save_png(file));
   std::ifstream in(file, std::ios::binary);
   std::array<unsigned char, 24> head{};
   in.read(reinterpret_cast<char*>(head.data()), head.size());
@@ -42,7 +42,7 @@ TEST_F(Window, IsSavedAsPng) {
   // IHDR: width and height as big-endian 32-bit numbers.
   EXPECT_EQ(head[18] * 256 + head[19], kWidth);
   EXPECT_EQ(head[22] * 256 + head[23], kHeight);
-  EXPECT_FALSE(window_->save_png("/nowhere/at/all.png"));
+  EXPECT_FALSE(window_->scene().save_png("/nowhere/at/all.png"));
 }
 
 }  // namespace

@@ -1,0 +1,91 @@
+// A local socket between a window and the haptic client of the same user: where the pointer is, and what the tool does.
+// Each message is one packet of JSON text. The newest message counts, so neither side ever waits.
+#pragma once
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "common/core/result.hpp"
+#include "common/geometry/pose.hpp"
+
+namespace osteon {
+
+inline constexpr double kLeastPush_n = 1.0, kMostPush_n = 40.0;
+
+// From the window. Frame: bone.
+struct PointerInput {
+  Vec3 target_mm = Vec3::Zero();  // where the tool's tip rests: the point of the surface under the pointer
+  Eigen::Quaterniond rotation_bone_tool = Eigen::Quaterniond::Identity();  // the hand pushes along the tool's +z
+  bool on_bone = false;      // false: the pointer is not over bone; the tool is lifted off and waits
+  bool push = false;         // the button is held
+  double push_n = 10.0;      // kLeastPush_n to kMostPush_n
+  bool fine = false;         // motions across the axis at a tenth, while the hand pushes
+  double spindle = 0.0;      // share of the spindle's speed, 0 to 1
+  double spindle_rpm = 0.0;  // its full speed; 0: the tool's own
+  std::string tool{};        // that the hand is to hold; empty: no change
+  friend bool operator==(const PointerInput&, const PointerInput&) = default;
+};
+
+// From the haptic client. Frame: bone.
+struct PointerOutput {
+  Pose pose_bone_tool;
+  Vec3 force_hand_n = Vec3::Zero(), force_bone_n = Vec3::Zero();  // what the hand gets, what the bone gives
+  double push_n = 0;                                              // with which the hand pushes now
+  double depth_mm = 0;                                            // of the tip along its axis since the push began
+  bool pushing = false;   // false while the button is held: the hand has reacted to a breakthrough
+  bool on_metal = false;  // metal is in the way of the turning tool
+  std::string tool{};     // in the hand
+  std::string trouble{};  // one sentence, such as why a tool cannot be held; empty: none
+};
+
+// As text, and back. Errors of reading, invalid_input: another version; a field that is missing, of another type, not
+// finite, out of its range, or too long.
+[[nodiscard]] std::string encode(const PointerInput& input);
+[[nodiscard]] std::string encode(const PointerOutput& output);
+[[nodiscard]] Result<PointerInput> read_pointer_input(std::string_view text);
+[[nodiscard]] Result<PointerOutput> read_pointer_output(std::string_view text);
+
+// The window's end. For one thread; no call waits.
+class PointerServer {
+ public:
+  // Makes the socket, which only this user may open. A socket that a dead program left is replaced. Errors: exists (a
+  // program listens there), invalid_input (the path is too long), internal.
+  [[nodiscard]] static Result<std::unique_ptr<PointerServer>> listen(const std::filesystem::path& socket);
+  ~PointerServer();  // removes the socket
+
+  void send(const PointerInput& input);
+  // What the haptic client said last. None: it has said nothing yet.
+  [[nodiscard]] const std::optional<PointerOutput>& newest();
+  [[nodiscard]] bool connected();
+  [[nodiscard]] std::uint64_t refused() const;  // messages that could not be read
+
+ private:
+  struct Impl;
+  explicit PointerServer(std::unique_ptr<Impl> impl);
+  std::unique_ptr<Impl> impl_;
+};
+
+// The haptic client's end. For one thread.
+class PointerClient {
+ public:
+  // Errors: not_found (nobody listens there), denied (a program of another user does), invalid_input (the path is too
+  // long).
+  [[nodiscard]] static Result<std::unique_ptr<PointerClient>> connect(const std::filesystem::path& socket);
+  ~PointerClient();
+
+  // The newest message that came within this time. None: none came.
+  [[nodiscard]] std::optional<PointerInput> wait(int milliseconds);
+  void send(const PointerOutput& output);
+  [[nodiscard]] bool closed() const;            // the window has gone
+  [[nodiscard]] std::uint64_t refused() const;  // messages that could not be read
+
+ private:
+  struct Impl;
+  explicit PointerClient(std::unique_ptr<Impl> impl);
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace osteon

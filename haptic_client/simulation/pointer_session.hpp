@@ -1,0 +1,109 @@
+// A hand that a pointer leads: a mouse or a pen over a picture of the bone. The pointer says where the tool rests and
+// when the hand pushes. A simulated hand (Hand, common/mechanics) does it, with its mass, damper and reaction time. So
+// a drill that breaks through plunges as in the hand of a simulated surgeon. One call is one tick; the caller gives
+// time.
+#pragma once
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "common/runtime/triple_buffer.hpp"
+#include "haptic_client/simulation/free_hand.hpp"
+#include "haptic_client/simulation/session.hpp"
+
+namespace osteon::haptic {
+
+// What the pointer wants; bone frame. As PointerInput of common/input/pointer_link.hpp, without text.
+struct PointerCommand {
+  std::uint64_t number = 0;  // of the message; a new number says that the window lives
+  Vec3 target_mm = Vec3::Zero();
+  Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();
+  bool on_bone = false, push = false, fine = false;
+  double push_n = 10.0, spindle = 0.0, spindle_rpm = 0.0;
+  int tool = 0;  // index in the plan's tools
+};
+
+// What the hand and the tool do; bone frame.
+struct PointerState {
+  Pose pose_bone_tool;
+  Vec3 force_hand_n = Vec3::Zero(), force_bone_n = Vec3::Zero();
+  double push_n = 0, depth_mm = 0;
+  bool pushing = false, on_metal = false;
+  int tool = 0;
+};
+
+// Between the thread that reads the pointer and the haptic thread.
+struct PointerExchange {
+  TripleBuffer<PointerCommand> commands;  // pointer → haptic
+  TripleBuffer<PointerState> states;      // haptic → pointer
+};
+
+// A plan of one endless step with all of `tools` that a hand can hold. `first`: the tool that is held first, its law
+// and wear. Error invalid_input or not_found.
+[[nodiscard]] Result<ReadyPlan> make_pointed_hand(const FreeHandOptions& first, const Case& bone,
+                                                  const std::vector<Tool>& tools);
+
+enum class PointerPhase : std::uint8_t {
+  away,      // the pointer is not over bone, or silent: the tool waits off the bone
+  over,      // the hand brings the tool to where the pointer is
+  rests,     // the tool's tip is where the pointer meets the bone
+  pushes,    // the button is held
+  reacts,    // the bone gave way: the hand lets the push go
+  withdraws  // the button is up: the tool comes back along its axis
+};
+
+class PointerSession final : public Session {
+ public:
+  // `plan`: from make_pointed_hand(). `exchange` outlives the session.
+  PointerSession(ReadyPlan plan, PointerExchange& exchange, const SimulatedDeviceParams& device, double force_scale,
+                 double dt_s = 1e-3);
+
+  // [haptic] Time is counted in these ticks.
+  SessionTick tick(const Patch& patch, RoomLink room, int periods = 1,
+                   const std::vector<PlacedGuide>* room_guides = nullptr) noexcept override;
+  [[nodiscard]] bool done() const noexcept override { return false; }
+  [[nodiscard]] bool endless() const noexcept override { return true; }
+  [[nodiscard]] HapticLoop& loop() noexcept override { return loop_; }
+  [[nodiscard]] const ReadyPlan& plan() const noexcept override { return plan_; }
+  [[nodiscard]] const std::vector<StepResult>& results() const noexcept override { return results_; }
+  [[nodiscard]] const std::vector<LeftItem>& left() const noexcept override { return left_; }
+  [[nodiscard]] const HapticDevice& device() const noexcept override { return device_; }
+  [[nodiscard]] PointerPhase phase() const noexcept { return phase_; }
+  // Ticks in a row without a message, after which the pointer counts as silent.
+  static constexpr int kSilentTicks = 300;
+
+ private:
+  [[nodiscard]] bool silent() const noexcept { return ticks_since_message_ > kSilentTicks; }
+  void read_pointer() noexcept;
+  void act(double dt_s, SurgeonOrder& order) noexcept;
+  void take_up(const Vec3& tip_mm, SurgeonOrder& order) noexcept;
+  void begin_push() noexcept;
+  void follow_across() noexcept;
+  // The tip goes along a line to a point, at most this fast. True: it is there.
+  bool carry(const Vec3& to_mm, double speed_mm_per_s, double dt_s) noexcept;
+  [[nodiscard]] bool gave_way() noexcept;
+  void enter(PointerPhase phase) noexcept;
+  [[nodiscard]] Vec3 axis() const noexcept { return rotation_ * Vec3::UnitZ(); }
+  [[nodiscard]] Vec3 lifted(double height_mm) const noexcept;
+
+  ReadyPlan plan_;
+  PointerExchange& exchange_;
+  SimulatedDevice device_;
+  HapticLoop loop_;
+  LoopReport last_;
+  PointerCommand command_;
+  HandCommand hand_;
+  Eigen::Quaterniond rotation_ = Eigen::Quaterniond::Identity();  // of the tool in the hand
+  PointerPhase phase_ = PointerPhase::away;
+  bool taken_up_ = false;
+  int ticks_since_message_ = kSilentTicks + 1;
+  Vec3 pushed_from_mm_ = Vec3::Zero();  // where the tip was when the push began
+  Vec3 pointed_mm_ = Vec3::Zero();      // the pointer's target of the tick before
+  bool met_ = false;                    // the tool has been in bone since the push began
+  bool let_go_ = true;                  // the button was up since the last push
+  double react_s_ = 0;
+  std::vector<StepResult> results_{1};
+  std::vector<LeftItem> left_;
+};
+
+}  // namespace osteon::haptic

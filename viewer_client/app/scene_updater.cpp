@@ -1,0 +1,61 @@
+#include "viewer_client/app/scene_updater.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <utility>
+
+namespace osteon {
+
+bool SceneUpdater::update(bool tools_shown) {
+  Delivery delivery = queue_->take();
+  bool changed = false;
+  for (const Tool& tool : delivery.tools) scene_->learn_tool(tool);
+  if (delivery.any_states) {
+    states_ = std::move(delivery.states);
+    bodies_ = std::move(delivery.bodies);
+    changed = tools_shown;
+    if (items_ != delivery.items || !delivery.tools.empty()) {
+      items_ = std::move(delivery.items);
+      scene_->show_items(items_);
+      changed = true;
+    }
+  }
+  if (delivery.snapshot_begun) {
+    surface_.begin_snapshot();
+    complete_ = false;
+    snapshot_received_ = 0;
+    arrivals_.clear();
+  }
+  if (!delivery.any_mesh) return changed;
+
+  if (delivery.snapshot_blocks != 0) snapshot_blocks_ = delivery.snapshot_blocks;
+  snapshot_received_ += delivery.blocks.size();
+  for (auto& [key, block] : delivery.blocks) surface_.replace(std::move(block));
+  received_seq_ = delivery.room_seq;
+  arrivals_.insert(arrivals_.end(), delivery.arrivals.begin(), delivery.arrivals.end());
+  if (delivery.snapshot_complete && !complete_) {
+    surface_.end_snapshot();
+    complete_ = true;
+    changed = true;
+  }
+  // Until the whole surface was received, the picture shows the surface before it, or the progress of the first one.
+  if (!complete_) return true;
+  return rebuild() || changed;
+}
+
+bool SceneUpdater::rebuild() {
+  const auto begin = std::chrono::steady_clock::now();
+  const std::vector<RegionKey> regions = surface_.take_dirty();
+  if (regions.empty()) return false;
+  for (const RegionKey& region : regions) scene_->show_region(region, surface_.region_mesh(region));
+  regions_rebuilt_ += regions.size();
+  update_times_.record(std::chrono::steady_clock::now() - begin);
+  return true;
+}
+
+std::optional<std::size_t> SceneUpdater::percent_received() const {
+  if (complete_ || snapshot_blocks_ == 0) return std::nullopt;
+  return std::min<std::size_t>(99, 100 * snapshot_received_ / snapshot_blocks_);
+}
+
+}  // namespace osteon

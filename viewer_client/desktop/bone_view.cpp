@@ -1,0 +1,240 @@
+#include "viewer_client/desktop/bone_view.hpp"
+
+#include <QKeyEvent>
+#include <QMouseEvent>
+#include <QSurfaceFormat>
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include <vtkGenericOpenGLRenderWindow.h>
+#include <vtkNew.h>
+
+namespace osteon {
+
+namespace {
+
+constexpr double kRadPerPixel = 0.008, kZoomPerNotch = 0.85, kNewtonsPerNotch = 1.0, kNotch = 120.0;
+constexpr int kFrame_ms = 16;
+constexpr int kClick_px = 4;  // a longer way is a drag
+constexpr double kToolDistance_mm = 120.0;
+
+}  // namespace
+
+BoneView::BoneView(QWidget* parent) : QVTKOpenGLNativeWidget(parent) {
+  setFormat(QVTKOpenGLNativeWidget::defaultFormat());
+  vtkNew<vtkGenericOpenGLRenderWindow> window;
+  setRenderWindow(window);
+  scene_ = std::make_unique<BoneScene>(*window);
+  setFocusPolicy(Qt::StrongFocus);
+  setMouseTracking(true);
+  frame_timer_.setSingleShot(true);
+  connect(&frame_timer_, &QTimer::timeout, this, [this] { draw(); });
+}
+
+BoneView::~BoneView() {
+  updater_.reset();
+  makeCurrent();
+  scene_.reset();
+}
+
+void BoneView::show_room(RenderQueue* queue, const Box& bounds) {
+  updater_.reset();
+  surface_shown_ = false;
+  makeCurrent();
+  scene_.reset();
+  scene_ = std::make_unique<BoneScene>(*renderWindow());
+  bounds_ = bounds;
+  if (queue != nullptr) updater_.emplace(*queue, *scene_);
+  look_overview();
+  redraw();
+}
+
+void BoneView::arrived() {
+  if (!updater_) return;
+  if (updater_->update(true)) redraw();
+}
+
+void BoneView::set_holding(bool on) {
+  holding_ = on;
+  placing_ = placing_ && !on;
+  if (!on) {
+    pointer_.release();
+    pointer_.leave();
+  }
+  pointer_moved();
+}
+
+void BoneView::set_placing(bool on) {
+  placing_ = on;
+  if (on) set_holding(false);
+  setCursor(on ? Qt::CrossCursor : Qt::ArrowCursor);
+}
+
+void BoneView::redraw() {
+  if (!frame_timer_.isActive()) frame_timer_.start(kFrame_ms);
+}
+
+void BoneView::draw() {
+  if (!isVisible() || drawing_) return;
+  drawing_ = true;
+  if (updater_) scene_->show_tools(updater_->states());
+  QString notice = notice_;
+  if (updater_)
+    if (const auto percent = updater_->percent_received()) notice = tr("Receiving the surface, %1 %").arg(*percent);
+  scene_->show_text({}, notice.toStdString());
+  scene_->draw();
+  ++frames_;
+  surface_shown_ = updater_ && updater_->complete();
+  if (updater_) (void)updater_->take_arrivals();
+  drawing_ = false;
+}
+
+void BoneView::look(const CameraView& view) {
+  scene_->look(view);
+  camera_moved();
+}
+
+CameraView BoneView::camera() const { return scene_->camera(); }
+
+void BoneView::look_overview() { look(overview(bounds_)); }
+
+void BoneView::look_from(const Vec3& side) {
+  CameraView view = overview(bounds_);
+  const double distance = (view.eye_mm - view.target_mm).norm();
+  view.eye_mm = view.target_mm + distance * side.normalized();
+  view.up = std::abs(side.normalized().z()) < 0.9 ? Vec3(Vec3::UnitZ()) : Vec3(-Vec3::UnitY());
+  look(view);
+}
+
+void BoneView::look_tool() {
+  if (updater_ && !updater_->states().empty())
+    look(beside_tool(updater_->states().front().pose_bone_tool, kToolDistance_mm));
+}
+
+void BoneView::set_notice(const QString& notice) {
+  notice_ = notice;
+  redraw();
+}
+
+void BoneView::camera_moved() {
+  redraw();
+  if (events_.looked && width() > 0 && height() > 0) events_.looked(look_of(camera(), width(), height()));
+}
+
+void BoneView::pointer_moved() {
+  if (events_.pointed) events_.pointed();
+}
+
+void BoneView::point_at(const QPoint& at) {
+  if (!updater_) return;
+  pointer_.move(ray_through(camera(), width(), height(), at.x(), at.y()), updater_->surface());
+}
+
+void BoneView::turn_camera(const QPoint& by, Qt::KeyboardModifiers keys) {
+  if (keys & Qt::ShiftModifier)
+    look(shifted(camera(), static_cast<double>(by.x()) / height(), -static_cast<double>(by.y()) / height()));
+  else
+    look(orbited(camera(), kRadPerPixel * by.x(), -kRadPerPixel * by.y()));
+}
+
+void BoneView::resizeEvent(QResizeEvent* event) {
+  QVTKOpenGLNativeWidget::resizeEvent(event);
+  camera_moved();
+}
+
+void BoneView::mousePressEvent(QMouseEvent* event) {
+  last_ = pressed_ = event->pos();
+  camera_drag_ = event->button() == Qt::MiddleButton || !holding_;
+  if (!holding_ || event->button() != Qt::LeftButton) return;
+  point_at(event->pos());
+  // Beside the bone there is nothing to push at. Then the button turns the bone.
+  camera_drag_ = !pointer_.press();
+  pointer_moved();
+}
+
+void BoneView::mouseMoveEvent(QMouseEvent* event) {
+  const QPoint by = event->pos() - last_;
+  last_ = event->pos();
+  if (camera_drag_ && event->buttons() != Qt::NoButton) {
+    if ((event->buttons() & Qt::RightButton) && !(event->buttons() & (Qt::LeftButton | Qt::MiddleButton)))
+      look(zoomed(camera(), std::pow(kZoomPerNotch, -by.y() / 20.0)));
+    else
+      turn_camera(by, event->modifiers());
+    return;
+  }
+  if (!holding_) return;
+  pointer_.set_fine(event->modifiers() & Qt::ShiftModifier);
+  if (event->buttons() & Qt::RightButton) {
+    if (event->modifiers() & Qt::ControlModifier)
+      pointer_.roll(kRadPerPixel * by.x());
+    else
+      pointer_.turn(camera(), kRadPerPixel * by.x(), -kRadPerPixel * by.y());
+  } else {
+    point_at(event->pos());
+  }
+  pointer_moved();
+}
+
+void BoneView::mouseReleaseEvent(QMouseEvent* event) {
+  if (event->button() == Qt::LeftButton && pointer_.pushing()) {
+    pointer_.release();
+    point_at(event->pos());
+    pointer_moved();
+  }
+  if (event->button() == Qt::LeftButton && placing_ && (event->pos() - pressed_).manhattanLength() <= kClick_px) {
+    const SightRay ray = ray_through(camera(), width(), height(), event->pos().x(), event->pos().y());
+    const auto hit = updater_ ? updater_->surface().first_hit(ray.from_mm, ray.direction) : std::nullopt;
+    if (hit && events_.clicked) events_.clicked(*hit);
+  }
+  if (event->buttons() == Qt::NoButton) camera_drag_ = false;
+}
+
+void BoneView::wheelEvent(QWheelEvent* event) {
+  const double notches = event->angleDelta().y() / kNotch;
+  const bool sets_push = holding_ && pointer_.on_bone() && !(event->modifiers() & Qt::ControlModifier);
+  if (sets_push) {
+    pointer_.add_push(kNewtonsPerNotch * notches);
+    pointer_moved();
+  } else {
+    look(zoomed(camera(), std::pow(kZoomPerNotch, notches)));
+  }
+  event->accept();
+}
+
+void BoneView::leaveEvent(QEvent* event) {
+  QVTKOpenGLNativeWidget::leaveEvent(event);
+  pointer_.leave();
+  pointer_moved();
+}
+
+void BoneView::keyPressEvent(QKeyEvent* event) {
+  if (event->key() == Qt::Key_Space && holding_ && !event->isAutoRepeat()) {
+    pointer_.set_spindle(!pointer_.spindle());
+    pointer_moved();
+    return;
+  }
+  if (event->key() == Qt::Key_Shift) {
+    pointer_.set_fine(true);
+    pointer_moved();
+  }
+  // Not VTK's keys: the menus have their own.
+  event->ignore();
+}
+
+void BoneView::keyReleaseEvent(QKeyEvent* event) {
+  if (event->key() == Qt::Key_Shift) {
+    pointer_.set_fine(false);
+    pointer_moved();
+  }
+  event->ignore();
+}
+
+void BoneView::focusOutEvent(QFocusEvent* event) {
+  QVTKOpenGLNativeWidget::focusOutEvent(event);
+  // A hand that the user cannot see any more must not push on.
+  pointer_.release();
+  pointer_moved();
+}
+
+}  // namespace osteon

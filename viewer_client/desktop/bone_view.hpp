@@ -1,0 +1,96 @@
+// The picture of the bone in the window, and the mouse over it. Without a tool the left button turns the bone, as in an
+// image viewer. With a tool the left button pushes, the right button turns the tool, and the wheel sets the push. The
+// middle button always moves the camera.
+#pragma once
+#include <QCoreApplication>
+#include <QPoint>
+#include <QTimer>
+#include <functional>
+#include <memory>
+#include <optional>
+
+#include <QVTKOpenGLNativeWidget.h>
+
+#include "viewer_client/app/scene_updater.hpp"
+#include "viewer_client/render/bone_scene.hpp"
+#include "viewer_client/scene/tool_pointer.hpp"
+
+namespace osteon {
+
+// [GUI thread]
+class BoneView : public QVTKOpenGLNativeWidget {
+  Q_DECLARE_TR_FUNCTIONS(BoneView)
+
+ public:
+  struct Events {
+    std::function<void()> pointed;                   // pointer() changed
+    std::function<void(const SurfaceHit&)> clicked;  // a click on the bone while placing() is on
+    std::function<void(const ViewFrustum&)> looked;  // the camera moved
+  };
+
+  explicit BoneView(QWidget* parent = nullptr);
+  ~BoneView() override;
+
+  // Shows what arrives in this queue. The scene is empty again. The queue must outlive the next call. Null: no room.
+  void show_room(RenderQueue* queue, const Box& bounds);
+  void set_events(Events events) { events_ = std::move(events); }
+  // Something waits in the queue.
+  void arrived();
+
+  [[nodiscard]] ToolPointer& pointer() { return pointer_; }
+  // The mouse holds the tool. False: it moves the camera.
+  void set_holding(bool on);
+  [[nodiscard]] bool holding() const { return holding_; }
+  // The next click says where an item is to stand.
+  void set_placing(bool on);
+  [[nodiscard]] bool placing() const { return placing_; }
+
+  void look(const CameraView& view);
+  [[nodiscard]] CameraView camera() const;
+  void look_overview();
+  // From a direction: the eye lies that way from the middle of the bone.
+  void look_from(const Vec3& side);
+  void look_tool();
+  void set_notice(const QString& notice);
+
+  [[nodiscard]] const SceneUpdater* updater() const { return updater_ ? &*updater_ : nullptr; }
+  [[nodiscard]] BoneScene& scene() { return *scene_; }
+  // Marks the picture as old. It is drawn soon, at most at the display's rate.
+  void redraw();
+  [[nodiscard]] std::uint64_t frames() const { return frames_; }
+  [[nodiscard]] bool surface_shown() const { return surface_shown_; }
+
+ protected:
+  void resizeEvent(QResizeEvent* event) override;
+  void mousePressEvent(QMouseEvent* event) override;
+  void mouseMoveEvent(QMouseEvent* event) override;
+  void mouseReleaseEvent(QMouseEvent* event) override;
+  void wheelEvent(QWheelEvent* event) override;
+  void leaveEvent(QEvent* event) override;
+  void keyPressEvent(QKeyEvent* event) override;
+  void keyReleaseEvent(QKeyEvent* event) override;
+  void focusOutEvent(QFocusEvent* event) override;
+
+ private:
+  void draw();
+  void point_at(const QPoint& at);
+  void turn_camera(const QPoint& by, Qt::KeyboardModifiers keys);
+  void camera_moved();
+  void pointer_moved();
+
+  Events events_;
+  std::unique_ptr<BoneScene> scene_;
+  std::optional<SceneUpdater> updater_;
+  Box bounds_;
+  ToolPointer pointer_;
+  bool holding_ = false, placing_ = false;
+  QPoint last_;     // position of the mouse, device pixels
+  QPoint pressed_;  // where a button went down
+  bool camera_drag_ = false;
+  QString notice_;
+  QTimer frame_timer_;
+  bool drawing_ = false, surface_shown_ = false;
+  std::uint64_t frames_ = 0;
+};
+
+}  // namespace osteon

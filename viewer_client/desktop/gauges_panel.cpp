@@ -1,0 +1,110 @@
+#include "viewer_client/desktop/gauges_panel.hpp"
+
+#include <QCoreApplication>
+#include <QFormLayout>
+#include <QLabel>
+#include <QLocale>
+#include <QPainter>
+#include <QPainterPath>
+#include <QVBoxLayout>
+#include <algorithm>
+#include <cmath>
+
+namespace osteon {
+
+namespace {
+
+constexpr double kShown_s = 10.0, kLeastTop = 5.0;
+
+// With the user's decimal sign, and never a negative zero.
+QString number(double value, int decimals) {
+  const double step = std::pow(10.0, -decimals);
+  return QLocale().toString(std::round(value / step) * step + 0.0, 'f', decimals);
+}
+
+}  // namespace
+
+ScrollingPlot::ScrollingPlot(QWidget* parent) : QWidget(parent) {
+  setMinimumHeight(90);
+  setAccessibleName(tr("Force over the last ten seconds"));
+}
+
+void ScrollingPlot::add(double at_s, double first, double second) {
+  samples_.push_back({at_s, first, second});
+  while (samples_.front().at_s < at_s - kShown_s) samples_.pop_front();
+  update();
+}
+
+void ScrollingPlot::paintEvent(QPaintEvent*) {
+  QPainter painter(this);
+  painter.setRenderHint(QPainter::Antialiasing);
+  const QColor ink = palette().color(QPalette::WindowText);
+  painter.fillRect(rect(), palette().color(QPalette::Base));
+  double top = kLeastTop;
+  for (const Sample& sample : samples_) top = std::max({top, sample.first, sample.second});
+  top = std::ceil(top / kLeastTop) * kLeastTop;
+  painter.setPen(QColor(ink.red(), ink.green(), ink.blue(), 90));
+  painter.drawText(rect().adjusted(4, 2, -4, -2), Qt::AlignTop | Qt::AlignLeft, tr("%1 N").arg(number(top, 0)));
+  painter.drawLine(0, height() - 1, width(), height() - 1);
+  if (samples_.size() < 2) return;
+  const double now_s = samples_.back().at_s;
+  const auto line = [&](double Sample::*quantity, const QColor& colour, Qt::PenStyle style) {
+    QPainterPath path;
+    for (const Sample& sample : samples_) {
+      const QPointF at(width() * (1.0 - (now_s - sample.at_s) / kShown_s), height() * (1.0 - sample.*quantity / top));
+      path.elementCount() == 0 ? path.moveTo(at) : path.lineTo(at);
+    }
+    painter.setPen(QPen(colour, 1.6, style));
+    painter.drawPath(path);
+  };
+  // Blue and orange differ for colour-blind people too; one is dashed besides.
+  line(&Sample::first, QColor(0, 114, 178), Qt::SolidLine);
+  line(&Sample::second, QColor(230, 159, 0), Qt::DashLine);
+}
+
+GaugesPanel::GaugesPanel(QWidget* parent) : QWidget(parent) {
+  auto* form = new QFormLayout;
+  const auto gauge = [&](const QString& what, const char* name) {
+    auto* value = new QLabel("–");
+    value->setObjectName(name);
+    value->setAlignment(Qt::AlignRight | Qt::AlignVCenter);
+    QFont font = value->font();
+    font.setPointSizeF(1.2 * font.pointSizeF());
+    value->setFont(font);
+    value->setAccessibleName(what);
+    form->addRow(what, value);
+    return value;
+  };
+  push_ = gauge(tr("Push"), "push");
+  bone_ = gauge(tr("Force of the bone"), "force_bone");
+  hand_ = gauge(tr("Force on the hand"), "force_hand");
+  torque_ = gauge(tr("Torque"), "torque");
+  depth_ = gauge(tr("Depth"), "depth");
+  spindle_ = gauge(tr("Spindle"), "spindle");
+  feed_ = gauge(tr("Feed"), "feed");
+  density_ = gauge(tr("Density"), "density");
+  plot_ = new ScrollingPlot;
+  auto* all = new QVBoxLayout(this);
+  all->addLayout(form);
+  all->addWidget(plot_);
+  auto* legend =
+      new QLabel(tr("<span style='color:#0072b2'>—</span> bone   <span style='color:#e69f00'>- -</span> hand"));
+  all->addWidget(legend);
+  all->addStretch();
+}
+
+void GaugesPanel::show_push(double push_n) { push_->setText(tr("%1 N").arg(number(push_n, 0))); }
+
+void GaugesPanel::show(const CuttingState& state, const std::optional<PointerOutput>& hand, double at_s) {
+  const double bone_n = state.force_physical_N.norm(), hand_n = hand ? hand->force_hand_n.norm() : 0.0;
+  bone_->setText(tr("%1 N").arg(number(bone_n, 1)));
+  hand_->setText(hand ? tr("%1 N").arg(number(hand_n, 1)) : QString("–"));
+  torque_->setText(tr("%1 Nmm").arg(number(state.torque_Nmm, 0)));
+  depth_->setText(tr("%1 mm").arg(number(hand ? hand->depth_mm : state.depth_mm, 1)));
+  spindle_->setText(tr("%1 rpm").arg(number(state.spindle_rpm, 0)));
+  feed_->setText(tr("%1 mm/s").arg(number(state.feed_mm_per_s, 1)));
+  density_->setText(state.engaged_fraction > 0.0 ? tr("%1 g/cm³").arg(number(state.density_g_cm3, 2)) : QString("–"));
+  plot_->add(at_s, bone_n, hand_n);
+}
+
+}  // namespace osteon

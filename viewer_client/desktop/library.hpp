@@ -1,0 +1,72 @@
+// The bones that the start page offers, and the folders where the window keeps its files. Everything is below the
+// user's data folder, $XDG_DATA_HOME/osteon.
+#pragma once
+#include <QCoreApplication>
+#include <QString>
+#include <QStringList>
+#include <QTimer>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <vector>
+
+#include "viewer_client/desktop/child_process.hpp"
+
+namespace osteon {
+
+// A bone that comes with Osteon. Its case is made when it is opened first.
+struct ExampleBone {
+  QString id;       // "skull", or the name of a phantom
+  QString title;    // for people, translated
+  QStringList how;  // arguments of osteon-import without --out
+};
+// The skull from CT first, if its scan is installed; then the phantoms.
+[[nodiscard]] std::vector<ExampleBone> example_bones();
+
+// A bone or a session that was opened before.
+struct RecentEntry {
+  QString title;
+  std::filesystem::path bone;     // folder of the case
+  std::filesystem::path session;  // its folder
+};
+// Newest first; only those whose case is still there.
+[[nodiscard]] std::vector<RecentEntry> recent_entries();
+void remember(const RecentEntry& entry);
+
+[[nodiscard]] std::filesystem::path data_folder();
+[[nodiscard]] std::filesystem::path example_folder(const ExampleBone& bone);  // of its case
+[[nodiscard]] std::filesystem::path new_session_folder(const std::filesystem::path& bone);
+// The title of a case, or the name of its folder.
+[[nodiscard]] QString case_title(const std::filesystem::path& bone);
+[[nodiscard]] bool is_case(const std::filesystem::path& folder);
+
+// Makes a case by osteon-import. It can be cancelled at any time; then nothing is left.
+class CaseMaker : public QObject {
+  Q_DECLARE_TR_FUNCTIONS(CaseMaker)
+
+ public:
+  struct Events {
+    std::function<void(int percent)> progress;
+    std::function<void(const std::filesystem::path& bone)> made;
+    std::function<void(const QString& sentence)> failed;  // empty: cancelled
+  };
+  // `how`: arguments of osteon-import without --out.
+  CaseMaker(QStringList how, std::filesystem::path out, Events events);
+
+  void start();
+  void cancel();
+
+ private:
+  void read_progress();
+  void ended(int code);
+
+  QStringList how_;
+  std::filesystem::path out_;
+  Events events_;
+  bool cancelled_ = false;
+  QString log_file_;
+  QTimer progress_timer_;
+  std::unique_ptr<ChildProcess> importer_;
+};
+
+}  // namespace osteon

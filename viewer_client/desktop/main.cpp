@@ -1,0 +1,84 @@
+// osteon: the window in which a person practises bone surgery.
+#include <CLI/CLI.hpp>
+
+#include <QVTKOpenGLNativeWidget.h>
+#include <QApplication>
+#include <QSurfaceFormat>
+#include <QTranslator>
+#include <cstdio>
+#include <string>
+
+#include "common/runtime/command_line.hpp"
+#include "common/runtime/log.hpp"
+#include "viewer_client/desktop/main_window.hpp"
+
+namespace {
+
+using namespace osteon;
+
+constexpr const char* kProgram = "osteon";
+
+struct Arguments {
+  std::string bone, example, server, room, name;
+  wire::CredentialArguments credentials;
+};
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  Arguments arguments;
+  CLI::App app{"Practise bone surgery in a window: open a bone, take a tool with the mouse, and cut.", kProgram};
+  app.add_option("CASE", arguments.bone, "Folder of a case to open, as osteon-import writes it");
+  app.add_option("--example", arguments.example,
+                 "Opens a bone that comes with Osteon: skull, femur, tibia, patella, "
+                 "knee, hip or pelvis");
+  app.add_option("--server", arguments.server, "Joins a room instead: HOST:PORT of osteon-server");
+  app.add_option("--room", arguments.room, "Name of the room; not needed where the server has one");
+  app.add_option("--name", arguments.name, "Who you are, shown to others");
+  wire::add_credential_options(app, arguments.credentials);
+  if (const auto code = parse_arguments(app, argc, argv)) return *code;
+  log::open(kProgram);
+
+  if (qEnvironmentVariableIsEmpty("DISPLAY") && qEnvironmentVariableIsEmpty("QT_QPA_PLATFORM"))
+    return log::exit_with(
+        kProgram,
+        {ErrorCode::not_found, "there is no X display: DISPLAY is empty; start it on a desktop, or with xvfb-run"});
+  // Under Wayland the window uses XWayland: VTK 9.1 draws by GLX.
+  if (qEnvironmentVariableIsEmpty("QT_QPA_PLATFORM")) qputenv("QT_QPA_PLATFORM", "xcb");
+  QSurfaceFormat::setDefaultFormat(QVTKOpenGLNativeWidget::defaultFormat());
+  QApplication::setAttribute(Qt::AA_EnableHighDpiScaling);
+  QApplication qt(argc, argv);
+  QApplication::setApplicationName("osteon");
+  QApplication::setOrganizationName("osteon");
+  QTranslator translator;
+  if (translator.load(QLocale(), "osteon", "_", ":/translations")) QApplication::installTranslator(&translator);
+
+  MainWindow window;
+  window.show();
+  if (!arguments.server.empty()) {
+    const auto credentials = wire::client_credentials(arguments.credentials);
+    if (!credentials) return log::exit_with(kProgram, credentials.error());
+    window.join({QString::fromStdString(arguments.server), QString::fromStdString(arguments.room),
+                 QString::fromStdString(arguments.name), *credentials});
+  } else if (!arguments.bone.empty()) {
+    if (!is_case(arguments.bone))
+      return log::exit_with(kProgram,
+                            {ErrorCode::not_found, arguments.bone + " is not the folder of a case: it has no "
+                                                                    "case.json; name one that osteon-import wrote"});
+    window.practise(arguments.bone);
+  } else if (!arguments.example.empty()) {
+    std::string names;
+    for (const ExampleBone& bone : example_bones()) {
+      if (bone.id.toStdString() == arguments.example) {
+        window.open_example(bone);
+        return QApplication::exec();
+      }
+      names += (names.empty() ? "" : ", ") + bone.id.toStdString();
+    }
+    return log::exit_with(kProgram, {ErrorCode::not_found, "--example " + arguments.example +
+                                                               ": there is no such bone; "
+                                                               "choose one of " +
+                                                               names});
+  }
+  return QApplication::exec();
+}

@@ -1,0 +1,526 @@
+#include "viewer_client/desktop/main_window.hpp"
+
+#include <QAction>
+#include <QApplication>
+#include <QCloseEvent>
+#include <QDateTime>
+#include <QDialog>
+#include <QDialogButtonBox>
+#include <QDir>
+#include <QDockWidget>
+#include <QFileDialog>
+#include <QFormLayout>
+#include <QInputDialog>
+#include <QLabel>
+#include <QLineEdit>
+#include <QLocale>
+#include <QMenuBar>
+#include <QMessageBox>
+#include <QSettings>
+#include <QStackedWidget>
+#include <QStatusBar>
+#include <QToolBar>
+#include <algorithm>
+#include <utility>
+
+#include "common/tools/tool.hpp"
+#include "viewer_client/desktop/bone_view.hpp"
+#include "viewer_client/desktop/gauges_panel.hpp"
+#include "viewer_client/desktop/properties_panel.hpp"
+#include "viewer_client/desktop/start_page.hpp"
+#include "viewer_client/desktop/tool_bar.hpp"
+
+namespace osteon {
+
+namespace {
+
+constexpr int kGaugePeriod_ms = 50;
+// The pointer also sends while it rests, so that the haptic client knows that the window lives.
+constexpr int kPointerPeriod_ms = 50;
+constexpr int kMessage_ms = 8000;
+constexpr const char* kFirstTool = "drill-3.2";
+
+bool is_held(const std::string& name) {
+  const Result<Tool> tool = find_tool(name);
+  return tool && tool->cuts() && tool->kind != ToolKind::pin && tool->kind != ToolKind::screw;
+}
+
+}  // namespace
+
+MainWindow::MainWindow() {
+  setWindowTitle("Osteon");
+  setObjectName("osteon");
+  resize(1280, 800);
+  pages_ = new QStackedWidget;
+  start_ = new StartPage({[this](const ExampleBone& bone) { open_example(bone); },
+                          [this](const RecentEntry& entry) { practise(entry.bone, entry.session); },
+                          [this] { choose_case(); }, [this] { choose_scan(); }, [this] { choose_room(); },
+                          [this] {
+                            if (maker_) maker_->cancel();
+                          }});
+  view_ = new BoneView;
+  view_->setObjectName("bone");
+  view_->setAccessibleName(tr("The bone"));
+  view_->set_events({[this] { send_pointer(); }, [this](const SurfaceHit& hit) { place_item(hit); },
+                     [this](const ViewFrustum& from) {
+                       if (room_) room_->look(from);
+                     }});
+  pages_->addWidget(start_);
+  pages_->addWidget(view_);
+  setCentralWidget(pages_);
+  make_panels();
+  make_actions();
+  make_status();
+  enable_room_actions(false);
+  clock_.start();
+  connect(&gauge_timer_, &QTimer::timeout, this, [this] { refresh_gauges(); });
+  connect(&pointer_timer_, &QTimer::timeout, this, [this] { send_pointer(); });
+  const QSettings settings;
+  restoreGeometry(settings.value("window/geometry").toByteArray());
+  restoreState(settings.value("window/state").toByteArray());
+}
+
+MainWindow::~MainWindow() { leave_room(); }
+
+void MainWindow::make_panels() {
+  tools_ = new SurgeryToolBar([this](const std::string& tool) { take_tool(tool); }, this);
+  addToolBar(Qt::LeftToolBarArea, tools_);
+  const auto dock = [this](const QString& title, const char* name, QWidget* widget, Qt::DockWidgetArea area) {
+    auto* made = new QDockWidget(title, this);
+    made->setObjectName(name);
+    made->setWidget(widget);
+    addDockWidget(area, made);
+    return made;
+  };
+  gauges_ = new GaugesPanel;
+  properties_ = new PropertiesPanel(
+      [this](const PropertiesPanel::Chosen& chosen) {
+        view_->pointer().set_spindle_speed(chosen.spindle_rpm);
+        view_->pointer().set_push(chosen.push_n);
+        send_pointer();
+      },
+      [this](const std::string& tool) { take_tool(tool); });
+  dock(tr("Tool"), "tool_panel", properties_, Qt::RightDockWidgetArea);
+  dock(tr("Gauges"), "gauges_panel", gauges_, Qt::RightDockWidgetArea);
+}
+
+void MainWindow::make_actions() {
+  const auto action = [this](QMenu* menu, const QString& words, const char* name, const QKeySequence& keys,
+                             std::function<void()> call, bool in_room) {
+    auto* made = new QAction(words, this);
+    made->setObjectName(name);
+    made->setShortcut(keys);
+    connect(made, &QAction::triggered, this, [call = std::move(call)] { call(); });
+    menu->addAction(made);
+    if (in_room) room_actions_.push_back(made);
+    return made;
+  };
+
+  QMenu* file = menuBar()->addMenu(tr("&File"));
+  action(
+      file, tr("&Start page"), "start_page", QKeySequence("Ctrl+Home"), [this] { leave_room(); }, true);
+  QAction* open = action(
+      file, tr("&Open a case…"), "open_case", QKeySequence::Open, [this] { choose_case(); }, false);
+  action(
+      file, tr("&Import a CT…"), "import_scan", QKeySequence("Ctrl+I"), [this] { choose_scan(); }, false);
+  action(
+      file, tr("&Join a room…"), "join_room", QKeySequence("Ctrl+J"), [this] { choose_room(); }, false);
+  file->addSeparator();
+  QAction* save = action(
+      file, tr("Save a &picture…"), "save_picture", QKeySequence::Save, [this] { save_picture(); }, true);
+  file->addSeparator();
+  action(
+      file, tr("&Quit"), "quit", QKeySequence::Quit, [this] { close(); }, false);
+
+  QMenu* edit = menuBar()->addMenu(tr("&Edit"));
+  QAction* undo = action(
+      edit, tr("&Undo"), "undo", QKeySequence::Undo,
+      [this] { ask([](RoomSubscription& room) { return room.undo(1); }, tr("Undone.")); }, true);
+  QAction* redo = action(
+      edit, tr("&Redo"), "redo", QKeySequence::Redo,
+      [this] { ask([](RoomSubscription& room) { return room.redo(1); }, tr("Done again.")); }, true);
+  QAction* mark = action(
+      edit, tr("&Mark this moment…"), "mark", QKeySequence("Ctrl+M"), [this] { mark_moment(); }, true);
+
+  QMenu* view = menuBar()->addMenu(tr("&View"));
+  QAction* whole = action(
+      view, tr("&Whole bone"), "overview", Qt::Key_O, [this] { view_->look_overview(); }, true);
+  QAction* at_tool = action(
+      view, tr("At the &tool"), "look_tool", Qt::Key_T, [this] { view_->look_tool(); }, true);
+  view->addSeparator();
+  struct Side {
+    QString words;
+    const char* name;
+    const char* keys;
+    Vec3 side;  // LPS: x to the patient's left, y to the back, z to the head
+  };
+  const Side sides[] = {{tr("From the &front"), "front", "Ctrl+1", {0, -1, 0}},
+                        {tr("From the &back"), "back", "Ctrl+2", {0, 1, 0}},
+                        {tr("From the patient's &left"), "left", "Ctrl+3", {1, 0, 0}},
+                        {tr("From the patient's &right"), "right", "Ctrl+4", {-1, 0, 0}},
+                        {tr("From &above"), "above", "Ctrl+5", {0, 0, 1}},
+                        {tr("From b&elow"), "below", "Ctrl+6", {0, 0, -1}}};
+  for (const Side& side : sides)
+    action(
+        view, side.words, side.name, QKeySequence(side.keys), [this, from = side.side] { view_->look_from(from); },
+        true);
+  view->addSeparator();
+  action(
+      view, tr("F&ull screen"), "full_screen", QKeySequence::FullScreen,
+      [this] { isFullScreen() ? showNormal() : showFullScreen(); }, false);
+  view->addSeparator();
+  for (QDockWidget* panel : findChildren<QDockWidget*>()) view->addAction(panel->toggleViewAction());
+
+  QMenu* tools = menuBar()->addMenu(tr("&Tools"));
+  tools_->fill(*tools);
+  tools->addSeparator();
+  QAction* down = action(
+      tools, tr("&Put the tool down"), "put_down", Qt::Key_Escape, [this] { put_tool_down(); }, true);
+  spindle_ = action(
+      tools, tr("Run the &spindle"), "spindle", Qt::Key_R,
+      [this] {
+        view_->pointer().set_spindle(spindle_->isChecked());
+        send_pointer();
+      },
+      true);
+  spindle_->setCheckable(true);
+  sound_ = action(
+      tools, tr("S&ound"), "sound", QKeySequence("Ctrl+Shift+S"),
+      [this] {
+        if (practice_) practice_->set_sound(sound_->isChecked());
+      },
+      true);
+  sound_->setCheckable(true);
+  sound_->setChecked(true);
+
+  QMenu* help = menuBar()->addMenu(tr("&Help"));
+  action(
+      help, tr("&How to hold a tool"), "help", QKeySequence::HelpContents, [this] { show_help(); }, false);
+  action(
+      help, tr("&About Osteon"), "about", {},
+      [this] {
+        QMessageBox::about(
+            this, tr("About Osteon"),
+            tr("Osteon %1 simulates bone surgery. It is for research and teaching. It is not a medical device.")
+                .arg(QApplication::applicationVersion()));
+      },
+      false);
+
+  QToolBar* upper = addToolBar(tr("Actions"));
+  upper->setObjectName("actions");
+  for (QAction* shown : {open, save, undo, redo, mark, whole, at_tool, spindle_, down}) upper->addAction(shown);
+}
+
+void MainWindow::make_status() {
+  device_ = new QLabel;
+  device_->setObjectName("device");
+  position_ = new QLabel;
+  position_->setObjectName("position");
+  connection_ = new QLabel;
+  connection_->setObjectName("connection");
+  for (QLabel* label : {device_, position_, connection_}) statusBar()->addPermanentWidget(label);
+}
+
+void MainWindow::enable_room_actions(bool on) {
+  for (QAction* action : room_actions_) action->setEnabled(on);
+  tools_->setEnabled(on);
+  for (QDockWidget* panel : findChildren<QDockWidget*>()) panel->setEnabled(on);
+}
+
+void MainWindow::say(const QString& sentence) { statusBar()->showMessage(sentence, kMessage_ms); }
+
+void MainWindow::make_case(const QString& what, const QStringList& how, const std::filesystem::path& out) {
+  if (maker_) return;
+  start_->show_work(what);
+  pages_->setCurrentWidget(start_);
+  maker_ = std::make_unique<CaseMaker>(
+      how, out,
+      CaseMaker::Events{[this](int percent) { start_->show_progress(percent); },
+                        [this](const std::filesystem::path& bone) {
+                          maker_.release()->deleteLater();
+                          start_->end_work({});
+                          practise(bone);
+                        },
+                        [this](const QString& sentence) {
+                          maker_.release()->deleteLater();
+                          start_->end_work(sentence.isEmpty() ? tr("Cancelled. Nothing was written.") : sentence);
+                        }});
+  maker_->start();
+}
+
+void MainWindow::open_example(const ExampleBone& bone) {
+  if (maker_ || practice_) return;
+  const std::filesystem::path folder = example_folder(bone);
+  if (is_case(folder)) return practise(folder);
+  make_case(tr("%1 is made now. The next time it opens at once.").arg(bone.title), bone.how, folder);
+}
+
+void MainWindow::import_scan(const QString& source) {
+  leave_room();
+  const QString name = QFileInfo(source).completeBaseName().isEmpty() ? "case" : QFileInfo(source).completeBaseName();
+  std::filesystem::path out = data_folder() / "cases" / name.toStdString();
+  for (int n = 2; std::filesystem::exists(out); ++n)
+    out = data_folder() / "cases" / (name.toStdString() + "-" + std::to_string(n));
+  make_case(tr("Importing %1").arg(source), {"ct", source}, out);
+}
+
+void MainWindow::choose_scan() {
+  const QString folder = QFileDialog::getExistingDirectory(this, tr("The folder of a CT"));
+  if (!folder.isEmpty()) import_scan(folder);
+}
+
+void MainWindow::choose_case() {
+  const QString folder = QFileDialog::getExistingDirectory(this, tr("The folder of a case"));
+  if (folder.isEmpty()) return;
+  if (!is_case(folder.toStdString())) {
+    QMessageBox::warning(
+        this, "Osteon",
+        tr("%1 is not the folder of a case: it has no case.json. Choose such a folder, or import a CT.").arg(folder));
+    return;
+  }
+  leave_room();
+  practise(folder.toStdString());
+}
+
+void MainWindow::choose_room() {
+  QDialog dialog(this);
+  dialog.setWindowTitle(tr("Join a room"));
+  auto* form = new QFormLayout(&dialog);
+  QSettings settings;
+  const auto field = [&](const QString& what, const char* key) {
+    auto* edit = new QLineEdit(settings.value(QString("join/") + key).toString());
+    edit->setObjectName(key);
+    form->addRow(what, edit);
+    return edit;
+  };
+  QLineEdit* address = field(tr("Server, HOST:PORT"), "address");
+  QLineEdit* room = field(tr("Room (empty: the only one)"), "room");
+  QLineEdit* name = field(tr("Your name"), "name");
+  QLineEdit* certificates = field(tr("Folder of your certificate"), "certificates");
+  QLineEdit* ticket = field(tr("File of your ticket"), "ticket");
+  auto* buttons = new QDialogButtonBox(QDialogButtonBox::Ok | QDialogButtonBox::Cancel);
+  form->addRow(buttons);
+  connect(buttons, &QDialogButtonBox::accepted, &dialog, &QDialog::accept);
+  connect(buttons, &QDialogButtonBox::rejected, &dialog, &QDialog::reject);
+  if (dialog.exec() != QDialog::Accepted) return;
+  for (QLineEdit* edit : {address, room, name, certificates, ticket})
+    settings.setValue("join/" + edit->objectName(), edit->text());
+  wire::CredentialArguments arguments;
+  arguments.certificates = certificates->text().toStdString();
+  arguments.ticket = ticket->text().toStdString();
+  arguments.plain = certificates->text().isEmpty() && ticket->text().isEmpty();
+  const auto credentials = wire::client_credentials(arguments);
+  if (!credentials) {
+    QMessageBox::warning(this, "Osteon", QString::fromStdString(credentials.error().message));
+    return;
+  }
+  join({address->text(), room->text(), name->text(), *credentials});
+}
+
+void MainWindow::practise(const std::filesystem::path& bone, const std::filesystem::path& session) {
+  leave_room();
+  PracticeOptions options;
+  options.bone = bone;
+  options.folder = session.empty() ? new_session_folder(bone) : session;
+  options.cache = data_folder() / "cache";
+  options.tool = kFirstTool;
+  options.sound = sound_->isChecked();
+  QDir().mkpath(text_of(options.cache));
+
+  // A socket's path has at most 107 characters, so it is in the folder of this login and not beside the session.
+  const QString runtime = QStandardPaths::writableLocation(QStandardPaths::RuntimeLocation);
+  options.pointer = (runtime + "/osteon-pointer-" + QString::number(QCoreApplication::applicationPid())).toStdString();
+  auto pointer = PointerServer::listen(options.pointer);
+  if (!pointer) return room_ended(QString::fromStdString(pointer.error().message));
+  pointer_ = std::move(*pointer);
+  const QString title = case_title(bone);
+  opened_ = RecentEntry{tr("%1, %2").arg(title, QLocale().toString(QDateTime::currentDateTime(), QLocale::ShortFormat)),
+                        bone, options.folder};
+  if (!session.empty())
+    for (const RecentEntry& entry : recent_entries())
+      if (entry.session == session) opened_ = entry;
+
+  setWindowTitle(tr("%1 – Osteon").arg(title));
+  view_->set_notice(tr("The room opens…"));
+  pages_->setCurrentWidget(view_);
+  practice_ = std::make_unique<PracticeRoom>(
+      options, PracticeRoom::Events{[this](const QString& address) { room_opened(address); },
+                                    [this](const QString& sentence) { say(sentence); },
+                                    [this](const QString& sentence) { room_ended(sentence); }});
+  practice_->start();
+}
+
+void MainWindow::room_opened(const QString& address) {
+  if (room_) return;  // the server is back at its address; the link finds it by itself
+  join({address, {}, {}, {}});
+}
+
+void MainWindow::join(const RoomAddress& room) {
+  if (!practice_) leave_room();
+  address_ = room.address;
+  RoomSubscriptionOptions options;
+  options.address = room.address.toStdString();
+  options.room = room.room.toStdString();
+  options.credentials = room.credentials;
+  if (!room.name.isEmpty()) options.name = room.name.toStdString();
+  options.keep_trying = true;
+  options.first_look = [width = std::max(1, view_->width()), height = std::max(1, view_->height())](const Box& bone) {
+    return look_of(overview(bone), width, height);
+  };
+  room_ = std::make_unique<RoomLink>(
+      options,
+      RoomLink::Events{[this] { view_->arrived(); }, [this](const WatchedRoom& joined) { show_joined(joined); },
+                       [this](const Error& error) { room_ended(QString::fromStdString(error.message)); }});
+}
+
+void MainWindow::show_joined(const WatchedRoom& room) {
+  view_->show_room(&room_->queue(), room.bounds);
+  view_->set_notice({});
+  view_->arrived();
+  pages_->setCurrentWidget(view_);
+  if (!practice_) setWindowTitle(tr("%1 – Osteon").arg(QString::fromStdString(room.case_title)));
+  enable_room_actions(true);
+  gauge_timer_.start(kGaugePeriod_ms);
+  if (pointer_) pointer_timer_.start(kPointerPeriod_ms);
+  if (opened_) remember(*opened_);
+  view_->setFocus();
+  say(tr("Choose a tool on the left, then hold the left button on the bone."));
+}
+
+void MainWindow::leave_room() {
+  gauge_timer_.stop();
+  pointer_timer_.stop();
+  put_tool_down();
+  view_->show_room(nullptr, {});
+  room_.reset();
+  practice_.reset();
+  pointer_.reset();
+  opened_.reset();
+  enable_room_actions(false);
+  setWindowTitle("Osteon");
+  for (QLabel* label : {device_, position_, connection_}) label->clear();
+  start_->refresh();
+  pages_->setCurrentWidget(start_);
+}
+
+void MainWindow::room_ended(const QString& sentence) {
+  // The object that reports this is still at work, so it goes later.
+  QTimer::singleShot(0, this, [this, sentence] {
+    leave_room();
+    start_->end_work(sentence);
+  });
+}
+
+void MainWindow::take_tool(const std::string& tool) {
+  if (!room_) return;
+  properties_->show_tool(tool);
+  tools_->show_held(tool);
+  if (is_held(tool) && pointer_) {
+    placing_.clear();
+    view_->pointer().take(tool);
+    view_->set_holding(true);
+    spindle_->setChecked(true);
+    view_->pointer().set_spindle(true);
+    properties_->show_push(view_->pointer().push_n());
+    say(tr("Hold the left button on the bone to push. The wheel sets the push, the right button turns the tool."));
+  } else {
+    placing_ = tool;
+    view_->set_placing(true);
+    say(tr("Click on the bone to place it there."));
+  }
+  view_->setFocus();
+  send_pointer();
+}
+
+void MainWindow::put_tool_down() {
+  placing_.clear();
+  view_->set_placing(false);
+  view_->set_holding(false);
+  view_->pointer().set_spindle(false);
+  if (spindle_) spindle_->setChecked(false);
+  tools_->show_held({});
+  send_pointer();
+}
+
+void MainWindow::place_item(const SurfaceHit& hit) {
+  if (placing_.empty()) return;
+  ItemPlace where;
+  where.point_mm = hit.point_mm;
+  where.on_bone = true;
+  ask([tool = placing_, where, body = hit.body](RoomSubscription& room) { return room.place(tool, where, body); },
+      tr("Placed."));
+}
+
+void MainWindow::send_pointer() {
+  if (!pointer_) return;
+  ToolPointer& pointer = view_->pointer();
+  if (spindle_->isChecked() != pointer.spindle()) spindle_->setChecked(pointer.spindle());
+  gauges_->show_push(pointer.push_n());
+  properties_->show_push(pointer.push_n());
+  pointer_->send(pointer.input());
+}
+
+void MainWindow::ask(RoomLink::Request request, const QString& done) {
+  if (!room_) return;
+  room_->ask(std::move(request), [this, done](const Result<RoomAnswer>& answer) {
+    say(answer ? done : QString::fromStdString(answer.error().message));
+  });
+}
+
+void MainWindow::mark_moment() {
+  bool ok = false;
+  const QString label = QInputDialog::getText(this, tr("Mark this moment"), tr("Its name"), QLineEdit::Normal, {}, &ok);
+  if (ok && !label.isEmpty())
+    ask([label = label.toStdString()](RoomSubscription& room) { return room.mark(label); }, tr("Marked."));
+}
+
+void MainWindow::save_picture() {
+  QString file = QFileDialog::getSaveFileName(this, tr("Save the picture"), "osteon.png", tr("Pictures (*.png)"));
+  if (file.isEmpty()) return;
+  if (!file.endsWith(".png")) file += ".png";
+  const auto saved = view_->scene().save_png(file.toStdString());
+  view_->redraw();
+  say(saved ? tr("Saved %1.").arg(file) : QString::fromStdString(saved.error().message));
+}
+
+void MainWindow::show_help() {
+  QMessageBox::information(
+      this, tr("How to hold a tool"),
+      tr("<p><b>Choose a tool</b> in the left bar. A long click shows the other tools of its group.</p>"
+         "<p><b>Move the mouse</b> over the bone: the tool rests where the pointer is.<br>"
+         "<b>Hold the left button</b>: the hand pushes. <b>Wheel</b>: how hard it pushes.<br>"
+         "<b>Drag with the right button</b>: turns the tool; with Ctrl about its own axis.<br>"
+         "<b>Shift</b>: motions at a tenth. <b>Space</b>: spindle on or off. <b>Esc</b>: put the tool down.</p>"
+         "<p><b>Middle button</b>: turns the bone; with Shift it moves it. <b>Ctrl and wheel</b>: nearer or farther. "
+         "Beside the bone, and without a tool, the left button and the wheel do this too.</p>"));
+}
+
+void MainWindow::refresh_gauges() {
+  if (!room_) return;
+  if (const auto failed = room_->failure_seen()) return room_ended(QString::fromStdString(failed->message));
+  connection_->setText(room_->interrupted() ? tr("Connection lost, trying again")
+                                            : tr("Connected to %1").arg(address_));
+  const auto hand = pointer_ ? pointer_->newest() : std::nullopt;
+  const SceneUpdater* updater = view_->updater();
+  if (updater != nullptr && !updater->states().empty()) {
+    const CuttingState& state = updater->states().front();
+    gauges_->show(state, hand, 1e-3 * static_cast<double>(clock_.elapsed()));
+    const Vec3& at = state.pose_bone_tool.position_mm;
+    position_->setText(tr("Tip %1, %2, %3 mm")
+                           .arg(QLocale().toString(at.x(), 'f', 1), QLocale().toString(at.y(), 'f', 1),
+                                QLocale().toString(at.z(), 'f', 1)));
+  }
+  if (pointer_) device_->setText(pointer_->connected() ? tr("Pointer") : tr("The pointer's device is away"));
+  if (hand && !hand->trouble.empty()) say(QString::fromStdString(hand->trouble));
+}
+
+void MainWindow::closeEvent(QCloseEvent* event) {
+  QSettings settings;
+  settings.setValue("window/geometry", saveGeometry());
+  settings.setValue("window/state", saveState());
+  if (maker_) maker_->cancel();
+  leave_room();
+  event->accept();
+}
+
+}  // namespace osteon

@@ -1,0 +1,97 @@
+// The window of Osteon: the start page, and the page on which a person operates.
+#pragma once
+#include <QCoreApplication>
+#include <QElapsedTimer>
+#include <QMainWindow>
+#include <QTimer>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "common/input/pointer_link.hpp"
+#include "common/wire/credentials.hpp"
+#include "viewer_client/desktop/library.hpp"
+#include "viewer_client/desktop/practice_room.hpp"
+#include "viewer_client/desktop/room_link.hpp"
+
+class QAction;
+class QLabel;
+class QStackedWidget;
+
+namespace osteon {
+
+class BoneView;
+class GaugesPanel;
+class PropertiesPanel;
+class StartPage;
+class SurgeryToolBar;
+
+// A room on a server that others run.
+struct RoomAddress {
+  QString address, room, name;
+  wire::ClientCredentials credentials;
+};
+
+class MainWindow : public QMainWindow {
+  Q_DECLARE_TR_FUNCTIONS(MainWindow)
+
+ public:
+  MainWindow();
+  ~MainWindow() override;
+
+  // Opens a case to practise on, alone. `session`: a folder of an earlier session to go on with; empty: a new one.
+  void practise(const std::filesystem::path& bone, const std::filesystem::path& session = {});
+  void open_example(const ExampleBone& bone);
+  void join(const RoomAddress& room);
+  void import_scan(const QString& source);
+
+ protected:
+  void closeEvent(QCloseEvent* event) override;
+
+ private:
+  void make_actions();
+  void make_panels();
+  void make_status();
+
+  void make_case(const QString& what, const QStringList& how, const std::filesystem::path& out);
+  void choose_scan();
+  void choose_case();
+  void choose_room();
+  void leave_room();
+  void room_opened(const QString& address);
+  void show_joined(const WatchedRoom& room);
+  void room_ended(const QString& sentence);
+  void take_tool(const std::string& tool);
+  void put_tool_down();
+  void place_item(const SurfaceHit& hit);
+  void send_pointer();
+  void ask(RoomLink::Request request, const QString& done);
+  void mark_moment();
+  void save_picture();
+  void show_help();
+  void refresh_gauges();
+  void say(const QString& sentence);
+  void enable_room_actions(bool on);
+
+  QStackedWidget* pages_ = nullptr;
+  StartPage* start_ = nullptr;
+  BoneView* view_ = nullptr;
+  SurgeryToolBar* tools_ = nullptr;
+  GaugesPanel* gauges_ = nullptr;
+  PropertiesPanel* properties_ = nullptr;
+  QLabel *position_ = nullptr, *device_ = nullptr, *connection_ = nullptr;
+  std::vector<QAction*> room_actions_;
+  QAction *sound_ = nullptr, *spindle_ = nullptr;
+
+  std::unique_ptr<CaseMaker> maker_;
+  std::unique_ptr<PointerServer> pointer_;
+  std::unique_ptr<PracticeRoom> practice_;
+  std::unique_ptr<RoomLink> room_;
+  std::optional<RecentEntry> opened_;
+  std::string placing_;  // the item that the next click places
+  QString address_;
+  QTimer gauge_timer_, pointer_timer_;
+  QElapsedTimer clock_;
+};
+
+}  // namespace osteon

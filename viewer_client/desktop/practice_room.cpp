@@ -1,0 +1,131 @@
+#include "viewer_client/desktop/practice_room.hpp"
+
+#include <QCoreApplication>
+#include <QDir>
+#include <QElapsedTimer>
+#include <QFile>
+#include <utility>
+
+namespace osteon {
+
+namespace {
+
+// How often a child may die, one time after the other, before the room gives up.
+constexpr int kMostDeaths = 3;
+// A child that lived longer than this has begun well. Its death counts as the first one.
+constexpr int kSettled_ms = 20000;
+constexpr int kAddressPeriod_ms = 30;
+constexpr int kRestart_ms = 300;
+
+}  // namespace
+
+PracticeRoom::PracticeRoom(PracticeOptions options, Events events)
+    : options_(std::move(options)), events_(std::move(events)) {
+  connect(&address_timer_, &QTimer::timeout, this, [this] { look_for_address(); });
+}
+
+PracticeRoom::~PracticeRoom() {
+  over_ = true;
+  haptic_.reset();
+  audio_.reset();
+  server_.reset();
+}
+
+QString PracticeRoom::log_file(const QString& program) const {
+  return text_of(options_.folder / "logs") + '/' + program + ".log";
+}
+
+QString PracticeRoom::address_file() const { return text_of(options_.folder / "logs" / "address"); }
+
+void PracticeRoom::fail(const QString& sentence) {
+  if (over_) return;
+  over_ = true;
+  address_timer_.stop();
+  events_.failed(sentence);
+}
+
+void PracticeRoom::start() {
+  if (!QDir().mkpath(text_of(options_.folder / "logs")))
+    return fail(tr("Cannot make the folder %1. Choose a place where you may write.").arg(text_of(options_.folder)));
+  start_server();
+}
+
+void PracticeRoom::start_server() {
+  QFile::remove(address_file());
+  server_ = std::make_unique<ChildProcess>(log_file("osteon-server"));
+  connect(server_.get(), QOverload<int, QProcess::ExitStatus>::of(&QProcess::finished), this,
+          [this] { server_ended(); });
+  connect(server_.get(), &QProcess::errorOccurred, this, [this](QProcess::ProcessError error) {
+    if (error == QProcess::FailedToStart)
+      fail(tr("osteon-server is not installed. Install the package osteon-server."));
+  });
+  // After a restart the server takes its old address, so that clients find it again.
+  server_->start(
+      program_path("osteon-server"),
+      {"--case", text_of(options_.bone), "--listen", address_.isEmpty() ? "127.0.0.1:0" : address_, "--plain",
+       "--address-file", address_file(), "--journal", text_of(options_.folder / "session.journal")});
+  address_timer_.start(kAddressPeriod_ms);
+}
+
+void PracticeRoom::look_for_address() {
+  QFile file(address_file());
+  if (!file.open(QIODevice::ReadOnly)) return;
+  const QString line = QString::fromUtf8(file.readAll());
+  if (!line.endsWith('\n')) return;
+  address_timer_.stop();
+  address_ = line.trimmed();
+  QTimer::singleShot(kSettled_ms, server_.get(), [this] { server_deaths_ = 0; });
+  if (!haptic_) start_haptic();
+  if (!audio_ && options_.sound) start_audio();
+  events_.opened(address_);
+}
+
+void PracticeRoom::start_haptic() {
+  haptic_ = std::make_unique<ChildProcess>(log_file("osteon-haptic"));
+  connect(haptic_.get(), QOverload<int, QProcess::ExitStatus>::of(&QProcess::finished), this,
+          [this] { haptic_ended(); });
+  connect(haptic_.get(), &QProcess::errorOccurred, this, [this](QProcess::ProcessError error) {
+    if (error == QProcess::FailedToStart) fail(tr("osteon-haptic is not installed. Install the package osteon."));
+  });
+  haptic_->start(program_path("osteon-haptic"),
+                 {"--server", address_, "--plain", "--device", "pointer:" + text_of(options_.pointer), "--tool",
+                  options_.tool, "--cache", text_of(options_.cache), "--timeout", "60"});
+  QTimer::singleShot(kSettled_ms, haptic_.get(), [this] { haptic_deaths_ = 0; });
+}
+
+void PracticeRoom::start_audio() {
+  audio_ = std::make_unique<ChildProcess>(log_file("osteon-audio"));
+  connect(audio_.get(), QOverload<int, QProcess::ExitStatus>::of(&QProcess::finished), this, [this] { audio_ended(); });
+  audio_->start(program_path("osteon-audio"),
+                {"--server", address_, "--plain", "--output", "pulse", "--timeout", "60"});
+}
+
+void PracticeRoom::set_sound(bool on) {
+  options_.sound = on;
+  if (!on) audio_.reset();
+  if (on && !audio_ && !address_.isEmpty()) start_audio();
+}
+
+void PracticeRoom::server_ended() {
+  if (over_) return;
+  address_timer_.stop();
+  const QString why = server_->last_sentence();
+  if (++server_deaths_ >= kMostDeaths || address_.isEmpty()) return fail(why.isEmpty() ? tr("The server ended.") : why);
+  events_.notice(tr("The server ended and starts again. Nothing that it acknowledged is lost."));
+  QTimer::singleShot(kRestart_ms, this, [this] { start_server(); });
+}
+
+void PracticeRoom::haptic_ended() {
+  if (over_) return;
+  const QString why = haptic_->last_sentence();
+  if (++haptic_deaths_ >= kMostDeaths) return fail(why.isEmpty() ? tr("The haptic client ended.") : why);
+  events_.notice(tr("The haptic client ended and starts again."));
+  QTimer::singleShot(kRestart_ms, this, [this] { start_haptic(); });
+}
+
+void PracticeRoom::audio_ended() {
+  if (over_ || !options_.sound) return;
+  events_.notice(tr("There is no sound: %1").arg(audio_->last_sentence()));
+}
+
+}  // namespace osteon

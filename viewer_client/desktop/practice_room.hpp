@@ -1,0 +1,64 @@
+// "Practise alone": a room on this computer. It starts a server, a haptic client and an audio client as children on
+// loopback, watches them, starts them again when they die, and ends them.
+#pragma once
+#include <QCoreApplication>
+#include <QObject>
+#include <QString>
+#include <QTimer>
+#include <filesystem>
+#include <functional>
+#include <memory>
+
+#include "viewer_client/desktop/child_process.hpp"
+
+namespace osteon {
+
+struct PracticeOptions {
+  std::filesystem::path bone;     // folder of the case
+  std::filesystem::path folder;   // of the session: journal, logs. It is made if it is missing.
+  std::filesystem::path cache;    // where the haptic client keeps cases
+  std::filesystem::path pointer;  // socket of the window's pointer
+  QString tool;                   // that the hand holds first
+  bool sound = true;
+};
+
+// [GUI thread]
+class PracticeRoom : public QObject {
+  Q_DECLARE_TR_FUNCTIONS(PracticeRoom)
+
+ public:
+  struct Events {
+    std::function<void(const QString& address)> opened;   // the server takes clients; after its restart again
+    std::function<void(const QString& sentence)> notice;  // a child died and is started again, or there is no sound
+    std::function<void(const QString& sentence)> failed;  // the room has ended for good
+  };
+
+  PracticeRoom(PracticeOptions options, Events events);
+  ~PracticeRoom() override;  // ends the clients first, then the server
+
+  void start();
+  void set_sound(bool on);
+
+ private:
+  void start_server();
+  void look_for_address();
+  void start_haptic();
+  void start_audio();
+  void server_ended();
+  void haptic_ended();
+  void audio_ended();
+  [[nodiscard]] QString log_file(const QString& program) const;
+  [[nodiscard]] QString address_file() const;
+  void fail(const QString& sentence);
+
+  PracticeOptions options_;
+  Events events_;
+  QTimer address_timer_;
+  QString address_;
+  // of children that died soon after their start, one after the other
+  int server_deaths_ = 0, haptic_deaths_ = 0;
+  bool over_ = false;
+  std::unique_ptr<ChildProcess> server_, haptic_, audio_;
+};
+
+}  // namespace osteon

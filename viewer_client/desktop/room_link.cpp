@@ -1,0 +1,73 @@
+#include "viewer_client/desktop/room_link.hpp"
+
+#include <QMetaObject>
+#include <chrono>
+#include <utility>
+
+namespace osteon {
+
+RoomLink::RoomLink(const RoomSubscriptionOptions& options, Events events) : events_(std::move(events)) {
+  queue_.set_wake([this] { in_gui(events_.arrived); });
+  thread_ = std::thread([this, options] { work(options); });
+}
+
+RoomLink::~RoomLink() {
+  stop_ = true;
+  changed_.notify_all();
+  thread_.join();
+}
+
+void RoomLink::in_gui(std::function<void()> call) {
+  QMetaObject::invokeMethod(this, std::move(call), Qt::QueuedConnection);
+}
+
+void RoomLink::work(const RoomSubscriptionOptions& options) {
+  auto started = RoomSubscription::start(options, queue_, [this] { return stop_.load(); });
+  if (!started) {
+    in_gui([this, error = started.error()] { events_.ended(error); });
+    return;
+  }
+  RoomSubscription& subscription = **started;
+  // std::function copies, so the pointer travels in something that can be copied.
+  auto made = std::make_shared<std::unique_ptr<RoomSubscription>>(std::move(*started));
+  in_gui([this, made] {
+    subscription_ = std::move(*made);
+    events_.joined(subscription_->room());
+  });
+  using namespace std::chrono_literals;
+  while (!stop_) {
+    std::function<void(RoomSubscription&)> job;
+    {
+      MutexLock lock(mutex_);
+      // Wakes now and then, so that a stop between the check and the wait is seen.
+      changed_.wait_for(lock, 200ms, [this]() OSTEON_REQUIRES(mutex_) { return !jobs_.empty() || stop_; });
+      if (jobs_.empty() || stop_) continue;
+      job = std::move(jobs_.front());
+      jobs_.pop_front();
+    }
+    job(subscription);
+  }
+  // If the GUI thread never ran the call above, `made` still has the subscription. It outlives every job here.
+}
+
+void RoomLink::ask(Request request, Answered answered) {
+  if (!joined()) return answered(failure(ErrorCode::unavailable, "there is no room yet"));
+  {
+    const MutexLock lock(mutex_);
+    jobs_.push_back([this, request = std::move(request), answered = std::move(answered)](RoomSubscription& room) {
+      const Result<RoomAnswer> answer = request(room);
+      in_gui([answered, answer] { answered(answer); });
+    });
+  }
+  changed_.notify_all();
+}
+
+void RoomLink::look(const ViewFrustum& from) {
+  if (subscription_) subscription_->look(from);
+}
+
+std::optional<Error> RoomLink::failure_seen() const {
+  return subscription_ ? subscription_->failure_seen() : std::nullopt;
+}
+
+}  // namespace osteon

@@ -1,0 +1,60 @@
+// The window's connection to a room. Whatever waits for the network runs on a thread of its own, so that the window
+// never waits.
+#pragma once
+#include <QObject>
+#include <atomic>
+#include <deque>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <thread>
+
+#include "common/core/mutex.hpp"
+#include "common/core/result.hpp"
+#include "viewer_client/net/room_subscription.hpp"
+#include "viewer_client/scene/render_queue.hpp"
+
+namespace osteon {
+
+// [GUI thread], except for what runs inside.
+class RoomLink : public QObject {
+ public:
+  struct Events {                   // all in the GUI thread
+    std::function<void()> arrived;  // something waits in queue(); once until queue().take()
+    std::function<void(const WatchedRoom&)> joined;
+    std::function<void(const Error&)> ended;  // the room cannot be joined, or has refused the window for good
+  };
+  // A request to the room. It may wait; it runs on the link's own thread, one after the other.
+  using Request = std::function<Result<RoomAnswer>(RoomSubscription&)>;
+  using Answered = std::function<void(const Result<RoomAnswer>&)>;
+
+  RoomLink(const RoomSubscriptionOptions& options, Events events);
+  ~RoomLink() override;
+
+  // `answered` runs in the GUI thread. Before the room is joined, it gets the error unavailable.
+  void ask(Request request, Answered answered);
+  // The window's view; returns at once.
+  void look(const ViewFrustum& from);
+  [[nodiscard]] RenderQueue& queue() { return queue_; }
+  [[nodiscard]] bool joined() const { return subscription_ != nullptr; }
+  [[nodiscard]] bool interrupted() const { return subscription_ && subscription_->interrupted(); }
+  [[nodiscard]] std::optional<Error> failure_seen() const;
+
+ private:
+  void work(const RoomSubscriptionOptions& options);
+  // Runs it in the GUI thread, unless this object is gone by then.
+  void in_gui(std::function<void()> call);
+
+  Events events_;
+  RenderQueue queue_;
+  // Made by the own thread; the GUI thread has it from then on. Its functions may be called by both.
+  std::unique_ptr<RoomSubscription> subscription_;
+
+  std::atomic<bool> stop_ = false;
+  Mutex mutex_{LockRank::leaf};
+  CondVar changed_;
+  std::deque<std::function<void(RoomSubscription&)>> jobs_ OSTEON_GUARDED_BY(mutex_);
+  std::thread thread_;  // last: it uses the other members
+};
+
+}  // namespace osteon

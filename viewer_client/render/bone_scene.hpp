@@ -1,0 +1,75 @@
+// The picture in a render window: bone, tools, items, and what people say and draw. Its owner gives the window and
+// decides when to draw. So the same scene is in the window of a script, in a Qt widget, and in tests. It hides VTK from
+// the rest of the program. All functions: [render], the thread that owns the window.
+#pragma once
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "common/core/result.hpp"
+#include "common/mechanics/cutting_state.hpp"
+#include "common/tools/annotation.hpp"
+#include "common/tools/scene_item.hpp"
+#include "viewer_client/render/image.hpp"
+#include "viewer_client/scene/camera_view.hpp"
+#include "viewer_client/scene/surface_scene.hpp"
+
+class vtkRenderWindow;
+
+namespace osteon {
+
+class BoneScene {
+ public:
+  // Adds its renderers to the window, which must outlive it.
+  explicit BoneScene(vtkRenderWindow& window);
+  ~BoneScene();
+
+  // The region's whole mesh, bone frame. An empty mesh removes the region from the picture.
+  void show_region(const RegionKey& region, const Mesh& mesh);
+  // The tools of the room. Tools that are not in the list vanish. A translucent ghost shows the pose of the user's hand
+  // where it differs from the tool.
+  void show_tools(std::span<const CuttingState> states);
+  // Adds a tool that is not built in, as the room defines it. From then on states and items may name it.
+  void learn_tool(const Tool& tool);
+  // The items on the bone. Items that are not in the list vanish.
+  void show_items(std::span<const SceneItem> items);
+  void show_text(const std::string& gauges, const std::string& notice);
+  // The annotations of the room. Annotations that are not in the list vanish.
+  void show_annotations(std::span<const Annotation> drawn);
+  // Each tool shows the name of its person.
+  void show_names(std::map<AuthorId, std::string> names);
+  // What was said, one line for each person's text, and the restrictions of one's own hand, in lines.
+  void show_words(const std::vector<std::string>& said, const std::string& holding);
+  // What the mouse does next, as a sentence (empty: nothing), and a line that is being drawn, bone frame, mm.
+  void show_pen(const std::string& hint, const std::vector<Vec3>& stroke_mm);
+
+  // The point of the bone at a pixel, bone frame. Columns from the left, rows from the top.
+  [[nodiscard]] std::optional<Vec3> surface_at(int x_px, int y_px) const;
+  // The mean outer normal of the surface near a point, bone frame. None if no surface is near.
+  [[nodiscard]] std::optional<Vec3> normal_at(const Vec3& point_mm) const;
+
+  void look(const CameraView& view);
+  [[nodiscard]] CameraView camera() const;
+
+  // Smooth edges in live pictures. Saved pictures always have them.
+  void set_smooth(bool smooth);
+  void draw();
+  // Draws once more with soft shadows in hollows, and saves that picture. A live picture in software has no time for
+  // such shadows.
+  [[nodiscard]] Result<void> save_png(const std::filesystem::path& file);
+  // The picture of the last draw().
+  [[nodiscard]] Image image() const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+// Whether the window's OpenGL draws on the processor. The window's context must be usable.
+[[nodiscard]] bool draws_in_software(vtkRenderWindow& window);
+
+}  // namespace osteon

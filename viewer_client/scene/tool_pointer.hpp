@@ -1,0 +1,56 @@
+// Turns mouse and keys over the picture into what the pointer device of the haptic client wants to know: where the tool
+// rests, how it points, and how hard the hand pushes. Pure geometry; the window sends the result.
+#pragma once
+#include <optional>
+#include <string>
+
+#include "common/input/pointer_link.hpp"
+#include "viewer_client/scene/camera_view.hpp"
+#include "viewer_client/scene/surface_scene.hpp"
+
+namespace osteon {
+
+// [render]
+class ToolPointer {
+ public:
+  // The tool that the hand is to hold. Its turn begins anew.
+  void take(const std::string& tool);
+  void set_spindle_speed(double rpm) { input_.spindle_rpm = rpm; }  // 0: the tool's own
+
+  // The pointer moved to this ray. While nobody pushes, the tool rests where the ray meets the surface and points along
+  // the mean normal into the bone. While somebody pushes, the tool keeps its direction and moves across it.
+  void move(const SightRay& ray, const SurfaceScene& surface);
+  // The pointer left the picture.
+  void leave();
+  // The button went down. False: there is no bone under the pointer.
+  [[nodiscard]] bool press();
+  void release();
+  // Turns the tool by radians about the picture's axes: `right` about its vertical, `up` about its horizontal axis.
+  void turn(const CameraView& view, double right_rad, double up_rad);
+  void roll(double angle_rad);  // about its own axis, as of a saw
+  void add_push(double newtons);
+  void set_push(double newtons);
+  void set_fine(bool fine) { input_.fine = fine; }
+  void set_spindle(bool on) { spindle_ = on; }
+
+  [[nodiscard]] bool pushing() const { return input_.push; }
+  [[nodiscard]] bool on_bone() const { return input_.on_bone; }
+  [[nodiscard]] bool spindle() const { return spindle_; }
+  [[nodiscard]] double push_n() const { return input_.push_n; }
+  [[nodiscard]] const std::string& tool() const { return input_.tool; }
+  [[nodiscard]] const PointerInput& input();
+  // Of the bone under the pointer, when it last was over bone and nobody pushed.
+  [[nodiscard]] const std::optional<SurfaceHit>& hit() const { return hit_; }
+
+ private:
+  PointerInput input_;
+  std::optional<SurfaceHit> hit_;
+  Eigen::Quaterniond turn_ = Eigen::Quaterniond::Identity();  // of the tool, away from the normal, bone frame
+  double roll_rad_ = 0;
+  Vec3 normal_ = Vec3::UnitZ();
+  bool spindle_ = false;
+
+  void aim();
+};
+
+}  // namespace osteon
