@@ -22,4 +22,4 @@ _osteon() {
     compopt -o default 2>/dev/null || true  # files, where no command fits
   fi
 }
-complete -F _osteon osteon-import osteon-server osteon-haptic osteon-viewer osteon-audio
+complete -F _osteon osteon osteon-import osteon-server osteon-haptic osteon-viewer osteon-audio

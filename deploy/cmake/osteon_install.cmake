@@ -18,13 +18,22 @@ function(osteon_install_program name package)
     DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions RENAME ${name} COMPONENT ${package})
   if(OSTEON_MAN_PAGES)
     add_dependencies(man_pages ${name})
+    # The name of the window begins the names of all other programs.
+    set(pages "/${name}(-[a-z-]+)?\\.1$")
+    if(name STREQUAL osteon)
+      set(pages "/osteon\\.1$")
+    endif()
     install(DIRECTORY ${osteon_man_pages}/man1/ DESTINATION ${CMAKE_INSTALL_MANDIR}/man1 COMPONENT ${package}
-      FILES_MATCHING REGEX "/${name}(-[a-z-]+)?\\.1$")
+      FILES_MATCHING REGEX "${pages}")
   endif()
 endfunction()
 
-# The clients: an entry of the desktop's menu, access to the haptic devices, and a plan for the example skull.
-install(FILES ${PROJECT_SOURCE_DIR}/deploy/desktop/osteon-viewer.desktop
+# The window and the clients: entries of the desktop's menu, an icon, access to the haptic devices, and a plan for the
+# example skull.
+install(FILES ${PROJECT_SOURCE_DIR}/deploy/desktop/osteon.svg
+  DESTINATION ${CMAKE_INSTALL_DATADIR}/icons/hicolor/scalable/apps COMPONENT osteon)
+install(FILES ${PROJECT_SOURCE_DIR}/deploy/desktop/osteon.desktop
+              ${PROJECT_SOURCE_DIR}/deploy/desktop/osteon-viewer.desktop
   DESTINATION ${CMAKE_INSTALL_DATADIR}/applications COMPONENT osteon)
 install(FILES ${PROJECT_SOURCE_DIR}/deploy/udev/70-osteon-devices.rules
   DESTINATION lib/udev/rules.d COMPONENT osteon)

@@ -47,6 +47,7 @@ find_package(OpenVDB 10 REQUIRED)
 
 if(BUILD_TESTING)
   find_package(GTest REQUIRED)
+  find_package(Qt5 5.15 REQUIRED COMPONENTS Test)
   find_package(benchmark REQUIRED)
   pkg_check_modules(umockdev REQUIRED IMPORTED_TARGET umockdev-1.0)
 

@@ -70,13 +70,13 @@ class PointerSession final : public Session {
   [[nodiscard]] const HapticDevice& device() const noexcept override { return device_; }
   [[nodiscard]] PointerPhase phase() const noexcept { return phase_; }
   // Ticks in a row without a message, after which the pointer counts as silent.
-  static constexpr int kSilentTicks = 300;
+  static constexpr int kSilentTicks = 1000;
 
  private:
   [[nodiscard]] bool silent() const noexcept { return ticks_since_message_ > kSilentTicks; }
   void read_pointer() noexcept;
   void act(double dt_s, SurgeonOrder& order) noexcept;
-  void take_up(const Vec3& tip_mm, SurgeonOrder& order) noexcept;
+  void take_up(SurgeonOrder& order) noexcept;  // above the pointer's target
   void begin_push() noexcept;
   void follow_across() noexcept;
   // The tip goes along a line to a point, at most this fast. True: it is there.

@@ -4,6 +4,11 @@ import re
 PROGRAM = re.compile(r"^osteon_program\(\s*([\w-]+)(?:\s+PACKAGE\s+([\w-]+))?", re.MULTILINE)
 
 
+def pages(name):
+    """The man pages of a program and its commands. The window's name begins the names of all others."""
+    return name if name == "osteon" else f"{name}*"
+
+
 def programs(cmake_texts):
     """Name of each program -> its package, or "" where it names none."""
     return dict(found for text in cmake_texts for found in PROGRAM.findall(text))
@@ -32,7 +37,7 @@ def install_faults(found, lists, completion: str, man: str):
             faults.append(f"{name}: its package '{package}' has no deploy/debian/{package or 'PACKAGE'}.install")
             continue
         lines = lists[package].splitlines()
-        for line in (f"usr/bin/{name}", f"usr/share/man/man1/{name}*.1",
+        for line in (f"usr/bin/{name}", f"usr/share/man/man1/{pages(name)}.1",
                      f"usr/share/bash-completion/completions/{name}"):
             if line not in lines:
                 faults.append(f"deploy/debian/{package}.install: misses {line}")

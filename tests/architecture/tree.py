@@ -46,8 +46,8 @@ HAPTIC_LAYERS = {
     "simulation": {"device", "contact", "prediction", "rendering"},
     "app": {"net", "device", "contact", "prediction", "rendering", "simulation"},
 }
-# Inside a client: folders that only the client's app folder (and tests) may combine.
-OUTER = {"app": set(), "net": {"app"}}
+# Inside a client: which folders (and tests) may include this one.
+OUTER = {"app": set(), "desktop": set(), "net": {"app", "desktop"}}
 
 # Headers that are slow to compile or impose a library's conventions. They must stay out of headers, and within the
 # folders named here.

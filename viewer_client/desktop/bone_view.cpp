@@ -15,7 +15,7 @@ namespace osteon {
 namespace {
 
 constexpr double kRadPerPixel = 0.008, kZoomPerNotch = 0.85, kNewtonsPerNotch = 1.0, kNotch = 120.0;
-constexpr int kFrame_ms = 16;
+constexpr std::chrono::milliseconds kFrame{16};
 constexpr int kClick_px = 4;  // a longer way is a drag
 constexpr double kToolDistance_mm = 120.0;
 
@@ -72,12 +72,15 @@ void BoneView::set_placing(bool on) {
 }
 
 void BoneView::redraw() {
-  if (!frame_timer_.isActive()) frame_timer_.start(kFrame_ms);
+  if (frame_timer_.isActive()) return;
+  const auto wait = std::chrono::ceil<std::chrono::milliseconds>(next_frame_ - std::chrono::steady_clock::now());
+  frame_timer_.start(std::max(std::chrono::milliseconds(0), wait));
 }
 
 void BoneView::draw() {
   if (!isVisible() || drawing_) return;
   drawing_ = true;
+  const auto begin = std::chrono::steady_clock::now();
   if (updater_) scene_->show_tools(updater_->states());
   QString notice = notice_;
   if (updater_)
@@ -85,6 +88,9 @@ void BoneView::draw() {
   scene_->show_text({}, notice.toStdString());
   scene_->draw();
   ++frames_;
+  const auto end = std::chrono::steady_clock::now();
+  // Where drawing is slow, leave a third of the time to the other programs of this machine.
+  next_frame_ = std::max(begin + kFrame, end + (end - begin) / 2);
   surface_shown_ = updater_ && updater_->complete();
   if (updater_) (void)updater_->take_arrivals();
   drawing_ = false;
@@ -150,6 +156,7 @@ void BoneView::mousePressEvent(QMouseEvent* event) {
   point_at(event->pos());
   // Beside the bone there is nothing to push at. Then the button turns the bone.
   camera_drag_ = !pointer_.press();
+  if (!camera_drag_ && events_.pressed) events_.pressed();
   pointer_moved();
 }
 

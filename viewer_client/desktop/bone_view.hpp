@@ -5,14 +5,15 @@
 #include <QCoreApplication>
 #include <QPoint>
 #include <QTimer>
+#include <chrono>
 #include <functional>
 #include <memory>
 #include <optional>
 
 #include <QVTKOpenGLNativeWidget.h>
 
-#include "viewer_client/app/scene_updater.hpp"
 #include "viewer_client/render/bone_scene.hpp"
+#include "viewer_client/render/scene_updater.hpp"
 #include "viewer_client/scene/tool_pointer.hpp"
 
 namespace osteon {
@@ -24,6 +25,7 @@ class BoneView : public QVTKOpenGLNativeWidget {
  public:
   struct Events {
     std::function<void()> pointed;                   // pointer() changed
+    std::function<void()> pressed;                   // a push begins
     std::function<void(const SurfaceHit&)> clicked;  // a click on the bone while placing() is on
     std::function<void(const ViewFrustum&)> looked;  // the camera moved
   };
@@ -89,6 +91,7 @@ class BoneView : public QVTKOpenGLNativeWidget {
   bool camera_drag_ = false;
   QString notice_;
   QTimer frame_timer_;
+  std::chrono::steady_clock::time_point next_frame_{};
   bool drawing_ = false, surface_shown_ = false;
   std::uint64_t frames_ = 0;
 };

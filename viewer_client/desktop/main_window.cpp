@@ -61,7 +61,9 @@ MainWindow::MainWindow() {
   view_ = new BoneView;
   view_->setObjectName("bone");
   view_->setAccessibleName(tr("The bone"));
-  view_->set_events({[this] { send_pointer(); }, [this](const SurfaceHit& hit) { place_item(hit); },
+  view_->set_events({[this] { send_pointer(); },
+                     [this] { mark_before(tr("Before %1").arg(tool_title(view_->pointer().tool()))); },
+                     [this](const SurfaceHit& hit) { place_item(hit); },
                      [this](const ViewFrustum& from) {
                        if (room_) room_->look(from);
                      }});
@@ -104,48 +106,51 @@ void MainWindow::make_panels() {
   dock(tr("Gauges"), "gauges_panel", gauges_, Qt::RightDockWidgetArea);
 }
 
-void MainWindow::make_actions() {
-  const auto action = [this](QMenu* menu, const QString& words, const char* name, const QKeySequence& keys,
-                             std::function<void()> call, bool in_room) {
-    auto* made = new QAction(words, this);
-    made->setObjectName(name);
-    made->setShortcut(keys);
-    connect(made, &QAction::triggered, this, [call = std::move(call)] { call(); });
-    menu->addAction(made);
-    if (in_room) room_actions_.push_back(made);
-    return made;
-  };
+QAction* MainWindow::add_action(QMenu* menu, const QString& words, const char* name, const QKeySequence& keys,
+                                std::function<void()> call, bool in_room) {
+  auto* made = new QAction(words, this);
+  made->setObjectName(name);
+  made->setShortcut(keys);
+  connect(made, &QAction::triggered, this, [call = std::move(call)] { call(); });
+  menu->addAction(made);
+  if (in_room) room_actions_.push_back(made);
+  return made;
+}
 
+void MainWindow::make_file_menu() {
   QMenu* file = menuBar()->addMenu(tr("&File"));
-  action(
+  add_action(
       file, tr("&Start page"), "start_page", QKeySequence("Ctrl+Home"), [this] { leave_room(); }, true);
-  QAction* open = action(
+  add_action(
       file, tr("&Open a case…"), "open_case", QKeySequence::Open, [this] { choose_case(); }, false);
-  action(
+  add_action(
       file, tr("&Import a CT…"), "import_scan", QKeySequence("Ctrl+I"), [this] { choose_scan(); }, false);
-  action(
+  add_action(
       file, tr("&Join a room…"), "join_room", QKeySequence("Ctrl+J"), [this] { choose_room(); }, false);
   file->addSeparator();
-  QAction* save = action(
+  add_action(
       file, tr("Save a &picture…"), "save_picture", QKeySequence::Save, [this] { save_picture(); }, true);
   file->addSeparator();
-  action(
+  add_action(
       file, tr("&Quit"), "quit", QKeySequence::Quit, [this] { close(); }, false);
+}
 
+void MainWindow::make_edit_menu() {
   QMenu* edit = menuBar()->addMenu(tr("&Edit"));
-  QAction* undo = action(
-      edit, tr("&Undo"), "undo", QKeySequence::Undo,
-      [this] { ask([](RoomSubscription& room) { return room.undo(1); }, tr("Undone.")); }, true);
-  QAction* redo = action(
+  add_action(
+      edit, tr("&Undo"), "undo", QKeySequence::Undo, [this] { undo(); }, true);
+  add_action(
       edit, tr("&Redo"), "redo", QKeySequence::Redo,
       [this] { ask([](RoomSubscription& room) { return room.redo(1); }, tr("Done again.")); }, true);
-  QAction* mark = action(
+  add_action(
       edit, tr("&Mark this moment…"), "mark", QKeySequence("Ctrl+M"), [this] { mark_moment(); }, true);
+}
 
+void MainWindow::make_view_menu() {
   QMenu* view = menuBar()->addMenu(tr("&View"));
-  QAction* whole = action(
+  add_action(
       view, tr("&Whole bone"), "overview", Qt::Key_O, [this] { view_->look_overview(); }, true);
-  QAction* at_tool = action(
+  add_action(
       view, tr("At the &tool"), "look_tool", Qt::Key_T, [this] { view_->look_tool(); }, true);
   view->addSeparator();
   struct Side {
@@ -161,22 +166,24 @@ void MainWindow::make_actions() {
                         {tr("From &above"), "above", "Ctrl+5", {0, 0, 1}},
                         {tr("From b&elow"), "below", "Ctrl+6", {0, 0, -1}}};
   for (const Side& side : sides)
-    action(
+    add_action(
         view, side.words, side.name, QKeySequence(side.keys), [this, from = side.side] { view_->look_from(from); },
         true);
   view->addSeparator();
-  action(
+  add_action(
       view, tr("F&ull screen"), "full_screen", QKeySequence::FullScreen,
       [this] { isFullScreen() ? showNormal() : showFullScreen(); }, false);
   view->addSeparator();
   for (QDockWidget* panel : findChildren<QDockWidget*>()) view->addAction(panel->toggleViewAction());
+}
 
+void MainWindow::make_tools_menu() {
   QMenu* tools = menuBar()->addMenu(tr("&Tools"));
   tools_->fill(*tools);
   tools->addSeparator();
-  QAction* down = action(
+  add_action(
       tools, tr("&Put the tool down"), "put_down", Qt::Key_Escape, [this] { put_tool_down(); }, true);
-  spindle_ = action(
+  spindle_ = add_action(
       tools, tr("Run the &spindle"), "spindle", Qt::Key_R,
       [this] {
         view_->pointer().set_spindle(spindle_->isChecked());
@@ -184,7 +191,7 @@ void MainWindow::make_actions() {
       },
       true);
   spindle_->setCheckable(true);
-  sound_ = action(
+  sound_ = add_action(
       tools, tr("S&ound"), "sound", QKeySequence("Ctrl+Shift+S"),
       [this] {
         if (practice_) practice_->set_sound(sound_->isChecked());
@@ -192,11 +199,13 @@ void MainWindow::make_actions() {
       true);
   sound_->setCheckable(true);
   sound_->setChecked(true);
+}
 
+void MainWindow::make_help_menu() {
   QMenu* help = menuBar()->addMenu(tr("&Help"));
-  action(
+  add_action(
       help, tr("&How to hold a tool"), "help", QKeySequence::HelpContents, [this] { show_help(); }, false);
-  action(
+  add_action(
       help, tr("&About Osteon"), "about", {},
       [this] {
         QMessageBox::about(
@@ -205,10 +214,19 @@ void MainWindow::make_actions() {
                 .arg(QApplication::applicationVersion()));
       },
       false);
+}
 
+void MainWindow::make_actions() {
+  make_file_menu();
+  make_edit_menu();
+  make_view_menu();
+  make_tools_menu();
+  make_help_menu();
   QToolBar* upper = addToolBar(tr("Actions"));
   upper->setObjectName("actions");
-  for (QAction* shown : {open, save, undo, redo, mark, whole, at_tool, spindle_, down}) upper->addAction(shown);
+  for (const char* name :
+       {"open_case", "save_picture", "undo", "redo", "mark", "overview", "look_tool", "spindle", "put_down"})
+    upper->addAction(findChild<QAction*>(name));
 }
 
 void MainWindow::make_status() {
@@ -391,6 +409,7 @@ void MainWindow::leave_room() {
   gauge_timer_.stop();
   pointer_timer_.stop();
   put_tool_down();
+  undo_points_.clear();
   view_->show_room(nullptr, {});
   room_.reset();
   practice_.reset();
@@ -447,6 +466,7 @@ void MainWindow::place_item(const SurfaceHit& hit) {
   ItemPlace where;
   where.point_mm = hit.point_mm;
   where.on_bone = true;
+  mark_before(tr("Before %1").arg(tool_title(placing_)));
   ask([tool = placing_, where, body = hit.body](RoomSubscription& room) { return room.place(tool, where, body); },
       tr("Placed."));
 }
@@ -465,6 +485,21 @@ void MainWindow::ask(RoomLink::Request request, const QString& done) {
   room_->ask(std::move(request), [this, done](const Result<RoomAnswer>& answer) {
     say(answer ? done : QString::fromStdString(answer.error().message));
   });
+}
+
+void MainWindow::mark_before(const QString& what) {
+  if (!room_) return;
+  room_->ask([label = what.toStdString()](RoomSubscription& room) { return room.mark(label); },
+             [this](const Result<RoomAnswer>& answer) {
+               if (answer) undo_points_.push_back(answer->place);
+             });
+}
+
+void MainWindow::undo() {
+  if (undo_points_.empty()) return ask([](RoomSubscription& room) { return room.undo(1); }, tr("Undone."));
+  const RoomSeq to = undo_points_.back();
+  undo_points_.pop_back();
+  ask([to](RoomSubscription& room) { return room.undo_to(to); }, tr("Undone."));
 }
 
 void MainWindow::mark_moment() {
@@ -500,7 +535,7 @@ void MainWindow::refresh_gauges() {
   if (const auto failed = room_->failure_seen()) return room_ended(QString::fromStdString(failed->message));
   connection_->setText(room_->interrupted() ? tr("Connection lost, trying again")
                                             : tr("Connected to %1").arg(address_));
-  const auto hand = pointer_ ? pointer_->newest() : std::nullopt;
+  const std::optional<PointerOutput> hand = pointer_ ? pointer_->newest() : std::nullopt;
   const SceneUpdater* updater = view_->updater();
   if (updater != nullptr && !updater->states().empty()) {
     const CuttingState& state = updater->states().front();

@@ -7,6 +7,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "common/input/pointer_link.hpp"
 #include "common/wire/credentials.hpp"
@@ -15,7 +16,9 @@
 #include "viewer_client/desktop/room_link.hpp"
 
 class QAction;
+class QKeySequence;
 class QLabel;
+class QMenu;
 class QStackedWidget;
 
 namespace osteon {
@@ -49,7 +52,15 @@ class MainWindow : public QMainWindow {
   void closeEvent(QCloseEvent* event) override;
 
  private:
+  // An action in a menu. `in_room`: it is of use in a room only.
+  QAction* add_action(QMenu* menu, const QString& words, const char* name, const QKeySequence& keys,
+                      std::function<void()> call, bool in_room);
   void make_actions();
+  void make_file_menu();
+  void make_edit_menu();
+  void make_view_menu();
+  void make_tools_menu();
+  void make_help_menu();
   void make_panels();
   void make_status();
 
@@ -66,6 +77,10 @@ class MainWindow : public QMainWindow {
   void place_item(const SurfaceHit& hit);
   void send_pointer();
   void ask(RoomLink::Request request, const QString& done);
+  // Undo goes back to the moment before a push or an item, not by single cuts: a second of drilling is hundreds of
+  // them.
+  void mark_before(const QString& what);
+  void undo();
   void mark_moment();
   void save_picture();
   void show_help();
@@ -88,7 +103,8 @@ class MainWindow : public QMainWindow {
   std::unique_ptr<PracticeRoom> practice_;
   std::unique_ptr<RoomLink> room_;
   std::optional<RecentEntry> opened_;
-  std::string placing_;  // the item that the next click places
+  std::vector<RoomSeq> undo_points_;  // before each push and each item, oldest first
+  std::string placing_;               // the item that the next click places
   QString address_;
   QTimer gauge_timer_, pointer_timer_;
   QElapsedTimer clock_;

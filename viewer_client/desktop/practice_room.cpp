@@ -60,10 +60,10 @@ void PracticeRoom::start_server() {
       fail(tr("osteon-server is not installed. Install the package osteon-server."));
   });
   // After a restart the server takes its old address, so that clients find it again.
-  server_->start(
-      program_path("osteon-server"),
-      {"--case", text_of(options_.bone), "--listen", address_.isEmpty() ? "127.0.0.1:0" : address_, "--plain",
-       "--address-file", address_file(), "--journal", text_of(options_.folder / "session.journal")});
+  server_->start(program_path("osteon-server"),
+                 {"--case", text_of(options_.bone), "--listen", address_.isEmpty() ? "127.0.0.1:0" : address_,
+                  "--plain", "--address-file", address_file(), "--journal",
+                  text_of(options_.folder / "session.journal"), "--drain-seconds", "1"});
   address_timer_.start(kAddressPeriod_ms);
 }
 

@@ -8,6 +8,7 @@
 #include <QProgressBar>
 #include <QPushButton>
 #include <QVBoxLayout>
+#include <algorithm>
 #include <utility>
 
 namespace osteon {
@@ -32,50 +33,15 @@ StartPage::StartPage(Events events, QWidget* parent) : QWidget(parent), events_(
   title->setFont(large);
   auto* what = new QLabel(tr("Practise bone surgery. For research and teaching; not a medical device."));
   what->setWordWrap(true);
-
-  examples_ = new QListWidget;
-  examples_->setObjectName("examples");
-  examples_->setAccessibleName(tr("Bones to practise on"));
-  recent_ = new QListWidget;
-  recent_->setObjectName("recent");
-  recent_->setAccessibleName(tr("Sessions to go on with"));
-  // One click opens, as on any start page. Enter does the same for the keyboard.
-  const auto open_example = [this](QListWidgetItem* item) {
-    const auto bones = example_bones();
-    const int row = examples_->row(item);
-    if (row >= 0 && row < static_cast<int>(bones.size())) events_.open_example(bones[row]);
-  };
-  const auto open_recent = [this](QListWidgetItem* item) {
-    const auto entries = recent_entries();
-    const int row = recent_->row(item);
-    if (row >= 0 && row < static_cast<int>(entries.size())) events_.open_recent(entries[row]);
-  };
-  connect(examples_, &QListWidget::itemClicked, this, open_example);
-  connect(recent_, &QListWidget::itemClicked, this, open_recent);
-  for (QListWidget* list : {examples_, recent_}) {
-    connect(list, &QListWidget::itemActivated, this, [this, list, open_example, open_recent](QListWidgetItem* item) {
-      // A double click activates, too; its first click has opened already.
-      if (!list->isEnabled()) return;
-      list == examples_ ? open_example(item) : open_recent(item);
-    });
-  }
-
-  const auto button = [&](const QString& words, const char* name, const QString& tip, std::function<void()>& call) {
-    auto* made = new QPushButton(words);
-    made->setObjectName(name);
-    made->setToolTip(tip);
-    connect(made, &QPushButton::clicked, this, [call = &call] { (*call)(); });
-    choices_.push_back(made);
-    return made;
-  };
-  auto* buttons = new QVBoxLayout;
-  buttons->addWidget(button(tr("&Import a CT…"), "import",
-                            tr("Make a case from a folder of DICOM files, a zip or ISO file, NIfTI, NRRD or MetaImage"),
-                            events_.import_scan));
-  buttons->addWidget(button(tr("&Open a case…"), "open", tr("Open the folder of a case"), events_.open_case));
-  buttons->addWidget(button(tr("&Join a room…"), "join", tr("Join a room on a server, with certificate and ticket"),
-                            events_.join_room));
-  buttons->addStretch();
+  make_lists();
+  auto* grid = new QGridLayout;
+  grid->addWidget(heading(tr("Bones to practise on")), 0, 0);
+  grid->addWidget(heading(tr("Go on with")), 0, 1);
+  grid->addWidget(heading(tr("Your own")), 0, 2);
+  grid->addWidget(examples_, 1, 0);
+  grid->addWidget(recent_, 1, 1);
+  grid->addLayout(make_buttons(), 1, 2);
+  for (int column = 0; column < 3; ++column) grid->setColumnStretch(column, column < 2 ? 3 : 2);
 
   words_ = new QLabel;
   words_->setObjectName("words");
@@ -89,15 +55,6 @@ StartPage::StartPage(Events events, QWidget* parent) : QWidget(parent), events_(
   work->addWidget(progress_, 1);
   work->addWidget(cancel_);
 
-  auto* grid = new QGridLayout;
-  grid->addWidget(heading(tr("Bones to practise on")), 0, 0);
-  grid->addWidget(heading(tr("Go on with")), 0, 1);
-  grid->addWidget(heading(tr("Your own")), 0, 2);
-  grid->addWidget(examples_, 1, 0);
-  grid->addWidget(recent_, 1, 1);
-  grid->addLayout(buttons, 1, 2);
-  for (int column = 0; column < 3; ++column) grid->setColumnStretch(column, column < 2 ? 3 : 2);
-
   auto* all = new QVBoxLayout(this);
   all->setContentsMargins(40, 30, 40, 30);
   all->setSpacing(14);
@@ -106,10 +63,57 @@ StartPage::StartPage(Events events, QWidget* parent) : QWidget(parent), events_(
   all->addLayout(grid, 1);
   all->addWidget(words_);
   all->addLayout(work);
-  choices_.push_back(examples_);
-  choices_.push_back(recent_);
   end_work({});
   refresh();
+}
+
+void StartPage::make_lists() {
+  examples_ = new QListWidget;
+  examples_->setObjectName("examples");
+  examples_->setAccessibleName(tr("Bones to practise on"));
+  recent_ = new QListWidget;
+  recent_->setObjectName("recent");
+  recent_->setAccessibleName(tr("Sessions to go on with"));
+  for (QListWidget* list : {examples_, recent_}) {
+    // One click opens, as on any start page. Enter does the same for the keyboard. A double click does both; the list
+    // is disabled after the first.
+    const auto open = [this, list](QListWidgetItem* item) {
+      if (list->isEnabled() && list->isVisible()) open_row(*list, list->row(item));
+    };
+    connect(list, &QListWidget::itemClicked, this, open);
+    connect(list, &QListWidget::itemActivated, this, open);
+    choices_.push_back(list);
+  }
+}
+
+void StartPage::open_row(const QListWidget& list, int row) {
+  const auto index = static_cast<std::size_t>(std::max(0, row));
+  if (&list == examples_) {
+    const std::vector<ExampleBone> bones = example_bones();
+    if (index < bones.size()) events_.open_example(bones[index]);
+  } else {
+    const std::vector<RecentEntry> entries = recent_entries();
+    if (index < entries.size()) events_.open_recent(entries[index]);
+  }
+}
+
+QVBoxLayout* StartPage::make_buttons() {
+  auto* column = new QVBoxLayout;
+  const auto add = [&](const QString& words, const char* name, const QString& tip, std::function<void()>* call) {
+    auto* button = new QPushButton(words);
+    button->setObjectName(name);
+    button->setToolTip(tip);
+    connect(button, &QPushButton::clicked, this, [call] { (*call)(); });
+    choices_.push_back(button);
+    column->addWidget(button);
+  };
+  add(tr("&Import a CT…"), "import",
+      tr("Make a case from a folder of DICOM files, a zip or ISO file, NIfTI, NRRD or MetaImage"),
+      &events_.import_scan);
+  add(tr("&Open a case…"), "open", tr("Open the folder of a case"), &events_.open_case);
+  add(tr("&Join a room…"), "join", tr("Join a room on a server, with certificate and ticket"), &events_.join_room);
+  column->addStretch();
+  return column;
 }
 
 void StartPage::refresh() {

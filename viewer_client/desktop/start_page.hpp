@@ -10,6 +10,7 @@ class QLabel;
 class QListWidget;
 class QProgressBar;
 class QPushButton;
+class QVBoxLayout;
 
 namespace osteon {
 
@@ -33,6 +34,10 @@ class StartPage : public QWidget {
   void end_work(const QString& sentence);
 
  private:
+  void make_lists();
+  QVBoxLayout* make_buttons();
+  void open_row(const QListWidget& list, int row);
+
   Events events_;
   QListWidget *examples_, *recent_;
   QLabel* words_;

@@ -1,4 +1,4 @@
-#include "viewer_client/app/scene_updater.hpp"
+#include "viewer_client/render/scene_updater.hpp"
 
 #include <algorithm>
 #include <chrono>
@@ -6,14 +6,29 @@
 
 namespace osteon {
 
+namespace {
+
+// Whether two states of a tool look the same, in the picture and in its gauges.
+bool looks_same(const CuttingState& a, const CuttingState& b) {
+  return a.author == b.author && a.tool_name == b.tool_name && a.phase == b.phase && a.on_metal == b.on_metal &&
+         a.pose_bone_tool.position_mm == b.pose_bone_tool.position_mm &&
+         a.pose_bone_tool.rotation.coeffs() == b.pose_bone_tool.rotation.coeffs() &&
+         a.pose_bone_device.position_mm == b.pose_bone_device.position_mm &&
+         a.pose_bone_device.rotation.coeffs() == b.pose_bone_device.rotation.coeffs() &&
+         a.spindle_rpm == b.spindle_rpm && a.force_physical_N == b.force_physical_N && a.depth_mm == b.depth_mm &&
+         a.engaged_fraction == b.engaged_fraction && a.density_g_cm3 == b.density_g_cm3;
+}
+
+}  // namespace
+
 bool SceneUpdater::update(bool tools_shown) {
   Delivery delivery = queue_->take();
   bool changed = false;
   for (const Tool& tool : delivery.tools) scene_->learn_tool(tool);
   if (delivery.any_states) {
+    changed = tools_shown && !std::ranges::equal(states_, delivery.states, looks_same);
     states_ = std::move(delivery.states);
     bodies_ = std::move(delivery.bodies);
-    changed = tools_shown;
     if (items_ != delivery.items || !delivery.tools.empty()) {
       items_ = std::move(delivery.items);
       scene_->show_items(items_);
