@@ -79,13 +79,15 @@ void PointerSession::read_pointer() noexcept {
 
 Vec3 PointerSession::lifted(double height_mm) const noexcept { return command_.target_mm - height_mm * axis(); }
 
-void PointerSession::take_up(const Vec3& tip_mm, SurgeonOrder& order) noexcept {
+void PointerSession::take_up(SurgeonOrder& order) noexcept {
+  // The tool comes from where the pointer wants it to point from, not from where it pointed before.
+  rotation_ = command_.rotation;
+  const Vec3 tip_mm = lifted(kAway_mm);
   // The pointer's frame is the bone's. Only the length of the hand's ways is scaled, as for other devices.
   const double stiff_enough =
       device_.limits().stiffness_n_per_mm / (loop_.params().force_scale * loop_.params().stiffness_n_per_mm);
   WorkspaceMapping mapping;
   mapping.align(Eigen::Quaterniond::Identity(), std::min(1.0, stiff_enough), tip_mm, tip_mm);
-  rotation_ = command_.rotation;
   const Pose pose{tip_mm, rotation_};
   loop_.take_up(command_.tool, pose, mapping);
   device_.take(scaled(expert_hand(), loop_.params().force_scale, mapping.scale()),
@@ -131,7 +133,7 @@ bool PointerSession::gave_way() noexcept {
 void PointerSession::act(double dt_s, SurgeonOrder& order) noexcept {
   const bool there = command_.on_bone && !silent();
   if (!taken_up_) {
-    if (there) take_up(lifted(kAway_mm), order), enter(PointerPhase::over);
+    if (there) take_up(order), enter(PointerPhase::over);
     return;
   }
   const bool held = there && command_.push && let_go_;
@@ -149,7 +151,7 @@ void PointerSession::act(double dt_s, SurgeonOrder& order) noexcept {
       const double jump_mm = (lifted(kRest_mm) - hand_.target_mm).norm();
       if (other_tool || rotation_.angularDistance(command_.rotation) > kJump_rad ||
           (jump_mm > kJump_mm && phase_ == PointerPhase::rests) || jump_mm > 2.0 * kAway_mm) {
-        take_up(lifted(kAway_mm), order);
+        take_up(order);
         enter(PointerPhase::over);
         break;
       }

@@ -76,7 +76,7 @@ class PointerSession final : public Session {
   [[nodiscard]] bool silent() const noexcept { return ticks_since_message_ > kSilentTicks; }
   void read_pointer() noexcept;
   void act(double dt_s, SurgeonOrder& order) noexcept;
-  void take_up(const Vec3& tip_mm, SurgeonOrder& order) noexcept;
+  void take_up(SurgeonOrder& order) noexcept;  // above the pointer's target
   void begin_push() noexcept;
   void follow_across() noexcept;
   // The tip goes along a line to a point, at most this fast. True: it is there.

@@ -124,6 +124,9 @@ void expect_balance(const Table& log) {
   EXPECT_NEAR(median(forces), gives_n, 0.1 * kPush_n);
 }
 
+// The block fills 0 to −30 mm along z. Before the first cut a tip deeper than this has gone through bone.
+constexpr double kInside_mm = 0.1;
+
 TEST_F(PointerInRoom, DrillsLosesItsWindowAndDrillsOn) {
   Stage stage(24.0);
   Process haptic = start(stage);
@@ -169,6 +172,9 @@ TEST_F(PointerInRoom, DrillsLosesItsWindowAndDrillsOn) {
   EXPECT_EQ(summary["force_scale"], 1.0);
   const Table log = read_table(stage / "hand.csv");
   expect_balance(log);
+  // The tool came to the bone from outside.
+  for (std::size_t i = 0; i < log.entries() && log["rpm"][i] < 1.0; ++i)
+    ASSERT_GT(log["tip_z_mm"][i], -kInside_mm) << "at row " << i;
   // The hole is a cylinder with the drill's cone at its end, which is no taller than the drill is wide.
   double deepest_mm = 0.0;
   bool taken_up = false;
@@ -183,6 +189,35 @@ TEST_F(PointerInRoom, DrillsLosesItsWindowAndDrillsOn) {
 
   ASSERT_EQ(stage.server().terminate(), 0);
   EXPECT_EQ(read_json(stage / "server.json")["field_hash"], summary["field_hash"]);
+}
+
+TEST_F(PointerInRoom, AJumpToTheOtherSideGoesAroundTheBone) {
+  constexpr double kThickness_mm = 30.0;
+  const Stage stage(24.0);
+  Process haptic = start(stage);
+  input_.spindle = 1.0;
+  for (int i = 0; i < 2; ++i) {
+    input_.target_mm.z() = 0.0;
+    input_.rotation_bone_tool = pose_along(Vec3::Zero(), -Vec3::UnitZ()).rotation;
+    ASSERT_TRUE(say_until_rests()) << haptic.err();
+    say_for(1s);
+    input_.target_mm.z() = -kThickness_mm;
+    input_.rotation_bone_tool = pose_along(Vec3::Zero(), Vec3::UnitZ()).rotation;
+    ASSERT_TRUE(say_until_rests()) << haptic.err();
+    say_for(1s);
+  }
+  ASSERT_EQ(haptic.terminate(), 0) << haptic.err();
+  const Table log = read_table(stage / "hand.csv");
+  ASSERT_GT(log.entries(), 1000u);
+  int above = 0, below = 0;
+  for (std::size_t i = 0; i < log.entries(); ++i) {
+    const double z = log["tip_z_mm"][i];
+    ASSERT_TRUE(z > -kInside_mm || z < kInside_mm - kThickness_mm) << z << " at row " << i;
+    ASSERT_LT(log["force_physical_n"][i], 2.0) << "at row " << i;
+    ++(z > -kInside_mm ? above : below);
+  }
+  EXPECT_GT(std::min(above, below), 500);
+  EXPECT_EQ(read_json(stage / "hand.json")["removed_mm3"], 0.0);
 }
 
 TEST_F(PointerInRoom, TakesAnotherToolWithoutARestart) {
