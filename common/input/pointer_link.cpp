@@ -267,7 +267,8 @@ PointerServer::~PointerServer() { ::unlink(impl_->path.c_str()); }
 Result<std::unique_ptr<PointerServer>> PointerServer::listen(const std::filesystem::path& socket) {
   const Result<sockaddr_un> address = address_of(socket);
   if (!address) return tl::unexpected(address.error());
-  if (PointerClient::connect(socket))
+  const auto other = PointerClient::connect(socket);
+  if (other || other.error().code == ErrorCode::unavailable || other.error().code == ErrorCode::denied)
     return failure(ErrorCode::exists, "a program listens at the pointer's socket " + socket.string() +
                                           " already; end it, or choose another path");
   auto impl = std::make_unique<Impl>();
@@ -316,9 +317,14 @@ Result<std::unique_ptr<PointerClient>> PointerClient::connect(const std::filesys
   auto impl = std::make_unique<Impl>();
   impl->peer = Handle(::socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
   if (!impl->peer) return tl::unexpected(trouble(socket, "cannot be made"));
-  if (::connect(impl->peer.get(), reinterpret_cast<const sockaddr*>(&*address), sizeof(sockaddr_un)) != 0)
+  if (::connect(impl->peer.get(), reinterpret_cast<const sockaddr*>(&*address), sizeof(sockaddr_un)) != 0) {
+    // Others wait for this window already. So it lives, even if it is busy.
+    if (errno == EAGAIN)
+      return failure(ErrorCode::unavailable, "the window at the pointer's socket " + socket.string() +
+                                                 " has a haptic client already; end that one first");
     return failure(ErrorCode::not_found, "no window listens at the pointer's socket " + socket.string() +
                                              "; start osteon, which starts this program by itself");
+  }
   if (!same_user(impl->peer.get()))
     return failure(ErrorCode::denied,
                    "the pointer's socket " + socket.string() + " belongs to another user; name one of your own");

@@ -71,8 +71,8 @@ class PointerServer {
 // The haptic client's end. For one thread.
 class PointerClient {
  public:
-  // Errors: not_found (nobody listens there), denied (a program of another user does), invalid_input (the path is too
-  // long).
+  // Errors: not_found (nobody listens there), denied (a program of another user does), unavailable (other clients wait
+  // there), invalid_input (the path is too long).
   [[nodiscard]] static Result<std::unique_ptr<PointerClient>> connect(const std::filesystem::path& socket);
   ~PointerClient();
 

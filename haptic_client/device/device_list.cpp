@@ -81,7 +81,7 @@ constexpr std::array<Kind, 7> kKinds{{
 }};
 
 std::string all_names() {
-  std::string names = "simulated, simulated-3.3N";
+  std::string names = "simulated, simulated-3.3N, pointer:SOCKET";
   for (const Kind& kind : kKinds)
     names += ", " + std::string(kind.name) + (kind.argument.empty() ? "" : "[:" + std::string(kind.argument) + ']');
   return names;
@@ -102,6 +102,8 @@ Made make_one(std::string_view text, std::string_view whole, const DeviceOptions
                                                    std::string(name) + "; leave out the colon");
     return kind.make(argument, options);
   }
+  if (name == "pointer")
+    return failure(ErrorCode::invalid_input, prefix + "a pointer is named alone, as pointer:SOCKET");
   if (find_simulated_device(name))
     return failure(ErrorCode::invalid_input,
                    prefix + std::string(name) + " has a simulated hand; name it alone, with a --plan");
@@ -132,6 +134,8 @@ std::vector<DeviceLine> look_for_devices(const DeviceOptions& options) {
   lines.push_back(
       {"simulated", "a simulated hand, strong enough for the drilling of bone; needs a plan", {{"always there"}, ""}});
   lines.push_back({"simulated-3.3N", "the same at a desktop device's force", {{"always there"}, ""}});
+  lines.push_back(
+      {"pointer", "the mouse of the window osteon, which starts this program: pointer:SOCKET", {{"always there"}, ""}});
   for (const Kind& kind : kKinds) lines.push_back({kind.name, kind.what, kind.look(options)});
   return lines;
 }

@@ -233,7 +233,7 @@ TEST_F(PhantomInRoom, DevicesAreListedWithWhatIsMissing) {
   EXPECT_EQ(list.exit_code, 0);
   EXPECT_THAT(list.out, HasSubstr("not here: OpenHaptics (libHD.so) is not installed"));
   EXPECT_THAT(list.out, HasSubstr("not here: Force Dimension's libdhd is not installed"));
-  for (const char* name : {"simulated", "falcon", "spacemouse", "pedal ", "pedal-axis", "recorded"})
+  for (const char* name : {"simulated", "pointer", "falcon", "spacemouse", "pedal ", "pedal-axis", "recorded"})
     EXPECT_THAT(list.out, HasSubstr(name));
   list = run(program("osteon-haptic"), {"devices", "--libhd", "/nowhere/libHD.so"});
   EXPECT_EQ(list.exit_code, 1);

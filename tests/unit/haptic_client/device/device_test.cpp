@@ -288,8 +288,9 @@ TEST(DeviceList, ShowsEveryKindAndWhatIsWrongWithTheFilesOfTheUser) {
     names.push_back(line.name);
     EXPECT_FALSE(line.finding.wrong_file) << line.name;
   }
-  EXPECT_EQ(names, (std::vector<std::string_view>{"simulated", "simulated-3.3N", "phantom", "force-dimension", "falcon",
-                                                  "spacemouse", "pedal", "pedal-axis", "recorded"}));
+  EXPECT_EQ(names,
+            (std::vector<std::string_view>{"simulated", "simulated-3.3N", "pointer", "phantom", "force-dimension",
+                                           "falcon", "spacemouse", "pedal", "pedal-axis", "recorded"}));
   for (const DeviceLine& line : look_for_devices(wrong)) {
     const bool has_file = line.name == "phantom" || line.name == "force-dimension" || line.name == "falcon";
     EXPECT_EQ(line.finding.wrong_file, has_file) << line.name;
