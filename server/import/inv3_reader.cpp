@@ -17,7 +17,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::size_t kReadBytes = 1 << 20;
+constexpr std::size_t kReadBytes = 1 << 16;  // as much as libarchive unpacks at once
 constexpr std::size_t kLargestPlist = 16 << 20;
 constexpr std::size_t kFirstValues = std::size_t{1} << 20;  // for which memory is allocated before any data has arrived
 
