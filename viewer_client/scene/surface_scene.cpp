@@ -170,6 +170,14 @@ std::optional<Vec3> SurfaceScene::mean_normal(const Vec3& point_mm, double radiu
   return sum.norm() > 0.0 ? std::optional(Vec3(sum.normalized())) : std::nullopt;
 }
 
+bool SurfaceScene::any_cut_face() const {
+  return std::ranges::any_of(regions_, [](const auto& region) {
+    return std::ranges::any_of(region.second, [](const auto& entry) {
+      return std::ranges::find(entry.second.mesh.cut_face, 1) != entry.second.mesh.cut_face.end();
+    });
+  });
+}
+
 std::size_t SurfaceScene::regions() const {
   return static_cast<std::size_t>(std::count_if(regions_.begin(), regions_.end(), [](const auto& region) {
     return std::any_of(region.second.begin(), region.second.end(),

@@ -64,6 +64,8 @@ class SurfaceScene {
   // The mean outer normal of the triangles within `radius_mm` of a point, weighted by area. None: no triangle is near.
   [[nodiscard]] std::optional<Vec3> mean_normal(const Vec3& point_mm, double radius_mm) const;
 
+  // Whether a vertex lies on a cut.
+  [[nodiscard]] bool any_cut_face() const;
   [[nodiscard]] std::size_t blocks() const { return drawn_blocks_; }  // with triangles
   [[nodiscard]] std::size_t triangles() const { return triangles_; }
   [[nodiscard]] std::size_t regions() const;  // with triangles

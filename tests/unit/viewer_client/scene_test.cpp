@@ -52,6 +52,16 @@ TEST(SurfaceScene, HashNamesContentNotOrderVersionOrEmptyBlocks) {
   EXPECT_NE(a.hash(), swapped.hash());
 }
 
+TEST(SurfaceScene, KnowsWhetherAnythingIsCut) {
+  SurfaceScene scene;
+  scene.replace(block(key(0), 1, "whole", sphere_mesh(Vec3::Zero(), 1.0, 0, 6)));
+  EXPECT_FALSE(scene.any_cut_face());
+  scene.replace(block(key(5), 1, "cut", sphere_mesh({5, 0, 0}, 1.0, 1, 6)));
+  EXPECT_TRUE(scene.any_cut_face());
+  scene.replace(block(key(5), 2, "whole again", sphere_mesh({5, 0, 0}, 1.0, 0, 6)));
+  EXPECT_FALSE(scene.any_cut_face());
+}
+
 TEST(SurfaceScene, AChangeTouchesOnlyItsRegion) {
   SurfaceScene scene;
   for (int x = -8; x < 8; ++x) scene.replace(block(key(x), 1, std::to_string(x), small_sphere(x)));
