@@ -230,9 +230,11 @@ TEST_P(Pages, RunFromAnEmptyFolder) {
   std::ofstream(folder / "commands.sh") << commands << "kill $(jobs -p) 2>/dev/null || true\nwait\n";
   ProcessOptions options = screen->options();
   options.folder = folder.path();
-  options.environment.insert(
-      options.environment.end(),
-      {{"OSTEON_LIBHD", OSTEON_STAND_IN_HD}, {"OSTEON_PYTHON", OSTEON_PYTHON}, {"XDG_CACHE_HOME", folder / "cache"}});
+  options.environment.insert(options.environment.end(), {{"OSTEON_LIBHD", OSTEON_STAND_IN_HD},
+                                                         {"OSTEON_PYTHON", OSTEON_PYTHON},
+                                                         {"XDG_CACHE_HOME", folder / "cache"},
+                                                         {"XDG_CONFIG_HOME", folder / "settings"},
+                                                         {"XDG_DATA_HOME", folder / "data"}});
   const RunResult done = run("bash", {folder / "commands.sh"}, kUntilHung, options);
   EXPECT_EQ(done.exit_code, 0) << done.out << done.err;
 }

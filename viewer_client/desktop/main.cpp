@@ -4,12 +4,14 @@
 #include <QVTKOpenGLNativeWidget.h>
 #include <QApplication>
 #include <QSurfaceFormat>
+#include <QTimer>
 #include <QTranslator>
 #include <cstdio>
 #include <string>
 
 #include "common/runtime/command_line.hpp"
 #include "common/runtime/log.hpp"
+#include "common/runtime/stop_signal.hpp"
 #include "viewer_client/desktop/main_window.hpp"
 
 namespace {
@@ -17,6 +19,7 @@ namespace {
 using namespace osteon;
 
 constexpr const char* kProgram = "osteon";
+constexpr int kStopPeriod_ms = 100;
 
 struct Arguments {
   std::string bone, example, server, room, name;
@@ -38,6 +41,7 @@ int main(int argc, char** argv) {
   wire::add_credential_options(app, arguments.credentials);
   if (const auto code = parse_arguments(app, argc, argv)) return *code;
   log::open(kProgram);
+  const StopSignal stop;
 
   if (qEnvironmentVariableIsEmpty("DISPLAY") && qEnvironmentVariableIsEmpty("QT_QPA_PLATFORM"))
     return log::exit_with(
@@ -55,6 +59,14 @@ int main(int argc, char** argv) {
 
   MainWindow window;
   window.show();
+  // A signal closes the window, which ends its children in order.
+  QTimer stopping;
+  QObject::connect(&stopping, &QTimer::timeout, [&] {
+    if (!stop.requested()) return;
+    window.close();
+    QApplication::quit();
+  });
+  stopping.start(kStopPeriod_ms);
   if (!arguments.server.empty()) {
     const auto credentials = wire::client_credentials(arguments.credentials);
     if (!credentials) return log::exit_with(kProgram, credentials.error());
