@@ -103,7 +103,8 @@ void GaugesPanel::show(const CuttingState& state, const std::optional<PointerOut
   depth_->setText(tr("%1 mm").arg(number(hand ? hand->depth_mm : state.depth_mm, 1)));
   spindle_->setText(tr("%1 rpm").arg(number(state.spindle_rpm, 0)));
   feed_->setText(tr("%1 mm/s").arg(number(state.feed_mm_per_s, 1)));
-  density_->setText(state.engaged_fraction > 0.0 ? tr("%1 g/cm³").arg(number(state.density_g_cm3, 2)) : QString("–"));
+  const bool in_bone = state.engaged_fraction > 0.0;
+  density_->setText(in_bone ? tr("%1 g/cm³").arg(number(state.density_g_cm3, 2)) : QString("–"));
   plot_->add(at_s, bone_n, hand_n);
 }
 
