@@ -134,7 +134,7 @@ Result<std::string> parts_table(const ReportFacts& facts) {
 
 std::string comparison_table(const LabelComparison& comparison) {
   std::string text =
-      "<h2>Compared with other labels</h2>\n<table>\n<tr><th>Label</th><th>With</th>"
+      "<h2>Compared with other labels</h2>\n<table>\n<tr><th>Label</th><th>With</th><th>Found by</th>"
       "<th class=\"number\">Dice</th><th class=\"number\">Mean distance, mm</th>"
       "<th class=\"number\">95 % distance, mm</th><th class=\"number\">Volume, cm³</th>"
       "<th class=\"number\">Its volume, cm³</th></tr>\n";
@@ -142,6 +142,7 @@ std::string comparison_table(const LabelComparison& comparison) {
     const bool found = !label.truth.empty();
     const std::string truth_cm3 = found ? number("%.2f", label.truth_cm3) : "–";
     text += "<tr>" + cell(escaped(label.name)) + cell(found ? escaped(label.truth) : "no such label") +
+            cell(std::string(name_of(label.matched))) +
             number_cell(found ? number("%.4f", label.agreement.dice) : "–") +
             number_cell(number("%.3f", label.agreement.mean_mm)) +
             number_cell(number("%.3f", label.agreement.percentile95_mm)) +
