@@ -120,8 +120,12 @@ void expect_three_bones(const PhantomBone& bone, double pitch_mm, const std::str
       }
   // Samples may fall beside a thin edge, and finer ones do not.
   for (const std::size_t i : {0u, 2u})
-    if (pitch_mm > 2.0 && count_islands(dims, solid[i]) > 1) return expect_three_bones(bone, 0.6 * pitch_mm, which);
-  for (const std::size_t i : {0u, 2u}) ASSERT_EQ(count_islands(dims, solid[i]), 1) << bone.names()[i] << ", " << which;
+    if (pitch_mm > kFinest_mm && count_islands(dims, solid[i]) > 1) return expect_three_bones(bone, 0.6 * pitch_mm, which);
+  for (const std::size_t i : {0u, 2u}) {
+    const std::vector<Island> islands = find_islands(dims, solid[i]);
+    ASSERT_EQ(islands.size(), 1u) << bone.names()[i] << ", " << which << "\n"
+                                  << islands_text(bone, islands, box.min, pitch_mm);
+  }
   // Between neighbouring samples of two bones there is a place without bone.
   const std::size_t steps[] = {to_index(dims.y) * to_index(dims.z), to_index(dims.z), 1};
   for (std::size_t n = 0; n < number.size(); ++n)
@@ -168,10 +172,10 @@ TEST(Pelvis, EveryPresetIsThreeBonesThatDoNotTouch) {
   }
 }
 
-TEST(Pelvis, TwentyRandomPelvesAreThreeBonesEach) {
+TEST(Pelvis, RandomPelvesAreThreeBonesEach) {
   test::Random random(61);
   int refused = 0;
-  for (int made = 0; made < 20;) {
+  for (int made = 0; made < random_sets();) {
     BoneRecipe recipe = pelvis_recipe();
     recipe.preset = kPresets[random.index(std::size(kPresets))];
     recipe.condition = kConditions[random.index(std::size(kConditions))];
@@ -184,7 +188,7 @@ TEST(Pelvis, TwentyRandomPelvesAreThreeBonesEach) {
     }
     const auto bone = make_bone(recipe);
     if (!bone) {
-      ASSERT_LT(++refused, 400) << bone.error().message;
+      ASSERT_LT(++refused, 20 * random_sets()) << bone.error().message;
       continue;
     }
     ++made;
