@@ -116,7 +116,7 @@ Result<std::string> parts_table(const ReportFacts& facts) {
       std::array<char, 96> swatch{};
       std::snprintf(swatch.data(), swatch.size(), "<span class=\"swatch\" style=\"background:#%02x%02x%02x\"></span>",
                     part.colour->red, part.colour->green, part.colour->blue);
-      name = swatch.data() + name;
+      name.insert(0, swatch.data());
     }
     if (!part.kind.empty() && part.kind != "bone") name += " (" + escaped(part.kind) + ")";
     std::array<char, 64> centre{};
@@ -188,7 +188,7 @@ Result<std::string> to_html(const ReportFacts& facts, const ReportImages& images
   if (!images.islands.empty())
     text += "<h2>All islands of bone</h2>\n" + image(images.islands, "All islands from the front and from the left") +
             "<p class=\"note\">Grey islands were left out. Numbers are those of the table and of --keep.</p>\n";
-  const auto parts = parts_table(facts);
+  auto parts = parts_table(facts);
   if (!parts) return parts;
   text += *parts + list_of("Left out", facts.left_out);
   if (!images.histogram.empty())
