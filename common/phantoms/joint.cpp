@@ -52,17 +52,19 @@ Box kept(const Box& box, const std::optional<Cut>& cut) {
 
 // A box around what a cut leaves, from the cells of a coarse lattice that may hold bone.
 Box box_of(const JointMember& member) {
-  const Box whole = kept(member.bone->bounds(), member.cut);
+  Box whole = kept(member.bone->bounds(), member.cut);
   if (!member.cut) return whole;
   const double reach = 0.5 * std::sqrt(3.0) * kBoxStep_mm;
   Box box;
-  for (double x = whole.min_mm.x(); x <= whole.max_mm.x(); x += kBoxStep_mm)
-    for (double y = whole.min_mm.y(); y <= whole.max_mm.y(); y += kBoxStep_mm)
-      for (double z = whole.min_mm.z(); z <= whole.max_mm.z(); z += kBoxStep_mm) {
-        const Vec3 middle = Vec3(x, y, z).array() + 0.5 * kBoxStep_mm;
+  const Eigen::Array3i cells = (whole.size_mm() / kBoxStep_mm).array().floor().cast<int>();
+  for (int i = 0; i <= cells.x(); ++i)
+    for (int j = 0; j <= cells.y(); ++j)
+      for (int k = 0; k <= cells.z(); ++k) {
+        const Vec3 lowest = whole.min_mm + kBoxStep_mm * Vec3(i, j, k);
+        const Vec3 middle = lowest.array() + 0.5 * kBoxStep_mm;
         if (member.bone->depths(middle).surface_mm > kSteepest * reach) continue;
-        box.include({x, y, z});
-        box.include(Vec3(x, y, z).array() + kBoxStep_mm);
+        box.include(lowest);
+        box.include(lowest.array() + kBoxStep_mm);
       }
   return kept(box, member.cut);
 }
@@ -289,7 +291,7 @@ Result<JointChanges> joint_changes(std::string_view kind, const std::map<std::st
         like != members.end() ? std::string(like->member) + "." + last
                               : std::string(members.front().member) + "." + std::string(members.front().names.front());
     std::string message = "\"" + name + "\" is no parameter of a " + std::string(kind) + "; write ";
-    for (const std::string_view known : own) message += std::string(known) + ", ";
+    for (const std::string_view known : own) message.append(known).append(", ");
     return bad_input(message + "or a bone's parameter after its name, such as " + example);
   }
   return found;

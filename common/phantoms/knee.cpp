@@ -93,10 +93,14 @@ std::vector<Vec3> back_of(const Patella& patella, const PatellaParameters& p) {
   const Distance bone = [&](const Vec3& at) { return patella.depths(at).surface_mm; };
   std::vector<Vec3> points;
   const int aside = static_cast<int>(0.5 * p.width_mm / kSampleStep_mm);
+  const int high = static_cast<int>(p.height_mm / kSampleStep_mm);
+  const int deep = static_cast<int>(2.0 * p.thickness_mm / kSampleStep_mm);
   for (int i = -aside; i <= aside; ++i)
-    for (double z = -0.5 * p.height_mm; z <= 0.5 * p.height_mm; z += kSampleStep_mm)
-      for (double y = 0.5 * p.thickness_mm; y > -0.5 * p.thickness_mm; y -= 0.5 * kSampleStep_mm)
-        if (const Vec3 at(i * kSampleStep_mm, y, z); bone(at) < 0.0) {
+    for (int j = 0; j <= high; ++j)
+      for (int k = 0; k <= deep; ++k)
+        if (const Vec3 at(i * kSampleStep_mm, 0.5 * (p.thickness_mm - k * kSampleStep_mm),
+                          j * kSampleStep_mm - 0.5 * p.height_mm);
+            bone(at) < 0.0) {
           points.push_back(surface_from(at, Vec3::UnitY(), bone));
           break;
         }

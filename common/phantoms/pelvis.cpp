@@ -254,7 +254,8 @@ void Pelvis::place_wing() {
   const double front = p_.spine_height_mm, back = p_.posterior_spine_height_mm;
   // The crest is an arch as high and as wide as asked.
   crest_rise_mm_ = crest_bulge_mm_ = std::numeric_limits<double>::infinity();
-  for (double t = 0.1; t < 0.8; t += 0.01) {
+  for (int percent = 10; percent < 80; ++percent) {
+    const double t = 0.01 * percent;
     const double rise = p_.crest_height_mm - front - t * (back - front);
     crest_rise_mm_ = std::min(crest_rise_mm_, rise / arch(t, kCrestTop).value);
     const double beside = 0.5 * p_.crests_mm - spine_.x() - t * chord_mm_ * chord_.x() - 0.55 * p_.crest_mm * out_.x();

@@ -142,24 +142,100 @@ int number_of(const CaseLabel& label) {
   return in_file == label.provenance.parameters.end() ? label.value : static_cast<int>(in_file->second);
 }
 
-std::string in_small_letters(std::string text) {
-  for (char& c : text)
-    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
-  return text;
-}
-
-const CaseLabel* counterpart(const CaseLabel& label, const std::vector<CaseLabel>& truth) {
-  for (const CaseLabel& other : truth)
-    if (in_small_letters(other.name) == in_small_letters(label.name)) return &other;
-  for (const CaseLabel& other : truth)
-    if (number_of(other) == number_of(label)) return &other;
-  return nullptr;
-}
-
 std::bitset<256> only(int value) {
   std::bitset<256> one;
   one.set(static_cast<std::size_t>(value));
   return one;
+}
+
+// What is compared: a label, or all labels of a bone that has one for each tissue.
+struct Comparable {
+  std::string name;
+  std::vector<std::string> words;  // of the name, sorted
+  int value = 0;                   // of the label; 0: several
+  int number = 0;                  // of the label, or of the bone among all bones
+  bool named = true;               // not only by a number
+  std::bitset<256> of;
+};
+
+std::vector<std::string> sorted(std::vector<std::string> words) {
+  std::ranges::sort(words);
+  return words;
+}
+
+// Names that Osteon gives where there is none.
+bool is_named(const CaseLabel& label) {
+  return label.name != "bone " + std::to_string(label.value) &&
+         label.name != "label " + std::to_string(number_of(label));
+}
+
+std::vector<Comparable> labels_alone(const std::vector<CaseLabel>& labels) {
+  std::vector<Comparable> alone;
+  for (const CaseLabel& label : labels)
+    alone.push_back(
+        {label.name, sorted(words_of(label.name)), label.value, number_of(label), is_named(label), only(label.value)});
+  return alone;
+}
+
+// All bones of labels of which at least one names a tissue. A bone is what is left of a name without the tissue.
+std::vector<Comparable> bones_of_tissues(const std::vector<CaseLabel>& labels) {
+  std::vector<Comparable> bones;
+  bool any = false;
+  for (const CaseLabel& label : labels) {
+    if (!is_carved(label.kind) || label.kind == LabelKind::metal || label.kind == LabelKind::enamel) continue;
+    std::vector<std::string> words = words_of(label.name);
+    any = std::erase_if(words, [](const std::string& word) { return is_tissue_word(word); }) > 0 || any;
+    std::string name;
+    for (const std::string& word : words) name += (name.empty() ? "" : " ") + word;
+    const std::vector<std::string> key = sorted(std::move(words));
+    auto bone = std::ranges::find(bones, key, &Comparable::words);
+    if (bone == bones.end()) {
+      const int number = static_cast<int>(bones.size()) + 1;
+      bone = bones.insert(bones.end(), {name.empty() ? "bone" : name, key, 0, number, true, {}});
+    }
+    bone->of |= only(label.value);
+  }
+  return any ? bones : std::vector<Comparable>();
+}
+
+struct Match {
+  const Comparable* truth = nullptr;
+  MatchedBy by = MatchedBy::nothing;
+};
+
+struct Pair {
+  Comparable ours;
+  Match match;
+};
+
+// All labels of the case, and bones of which the truth does not tell the tissues apart.
+std::vector<Pair> matched(const std::vector<CaseLabel>& labels, const std::vector<Comparable>& truth,
+                          const std::vector<Comparable>& truth_bones) {
+  const auto by_words = [](const Comparable& ours, const std::vector<Comparable>& list) -> const Comparable* {
+    const auto found = std::ranges::find(list, ours.words, &Comparable::words);
+    return found == list.end() ? nullptr : &*found;
+  };
+  std::vector<Pair> pairs;
+  std::bitset<256> taken;
+  for (Comparable& label : labels_alone(labels)) {
+    const Comparable* other = by_words(label, truth);
+    if (other == nullptr) other = by_words(label, truth_bones);
+    if (other != nullptr) taken |= other->of;
+    pairs.push_back({std::move(label), {other, other != nullptr ? MatchedBy::name : MatchedBy::nothing}});
+  }
+  for (Comparable& bone : bones_of_tissues(labels))
+    if (const Comparable* other = by_words(bone, truth); other != nullptr && (other->of & taken).none()) {
+      taken |= other->of;
+      pairs.push_back({std::move(bone), {other, MatchedBy::name}});
+    }
+  for (auto& [ours, match] : pairs) {
+    if (match.truth != nullptr) continue;
+    const std::vector<Comparable>& list = !ours.named && !truth_bones.empty() ? truth_bones : truth;
+    const auto other = std::ranges::find(list, ours.number, &Comparable::number);
+    if (other != list.end() && (!ours.named || !other->named) && (other->of & taken).none())
+      match = {&*other, MatchedBy::number};
+  }
+  return pairs;
 }
 
 std::bitset<256> carved(const std::vector<CaseLabel>& labels) {
@@ -256,25 +332,40 @@ Result<LabelComparison> compare_labels(const CaseScan& scan, const std::vector<C
     comparison.labels.push_back(std::move(row));
     return {};
   };
-  std::vector<const CaseLabel*> found;
-  const double all = static_cast<double>(labels.size()) + 1.0;
-  for (std::size_t i = 0; i < labels.size(); ++i) {
-    const CaseLabel& label = labels[i];
-    const CaseLabel* other = counterpart(label, truth.labels);
-    found.push_back(other);
+  const std::vector<Comparable> alone = labels_alone(truth.labels), bones = bones_of_tissues(truth.labels);
+  const std::vector<Pair> pairs = matched(labels, alone, bones);
+  std::bitset<256> found;
+  const double all = static_cast<double>(pairs.size()) + 1.0;
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    const auto& [compared, match] = pairs[i];
+    const std::bitset<256> of_truth = match.truth != nullptr ? match.truth->of : std::bitset<256>();
+    found |= of_truth;
     const KeepGoing going = part(keep_going, static_cast<double>(i) / all, static_cast<double>(i + 1) / all);
-    if (auto done = compare({label.value, label.name, other ? other->name : "", 0.0, 0.0, {}}, only(label.value),
-                            other ? only(other->value) : std::bitset<256>(), going);
+    if (auto done = compare(
+            {compared.value, compared.name, match.truth != nullptr ? match.truth->name : "", match.by, 0.0, 0.0, {}},
+            compared.of, of_truth, going);
         !done)
       return tl::unexpected(done.error());
   }
-  if (auto done = compare({0, "all bone", "all bone", 0.0, 0.0, {}}, carved(labels), carved(truth.labels),
-                          part(keep_going, static_cast<double>(labels.size()) / all, 1.0));
+  if (auto done = compare({0, "all bone", "all bone", MatchedBy::nothing, 0.0, 0.0, {}}, carved(labels),
+                          carved(truth.labels), part(keep_going, static_cast<double>(pairs.size()) / all, 1.0));
       !done)
     return tl::unexpected(done.error());
   for (const CaseLabel& label : truth.labels)
-    if (std::ranges::find(found, &label) == found.end()) comparison.missing.push_back(label.name);
+    if (!found[static_cast<std::size_t>(label.value)]) comparison.missing.push_back(label.name);
   return comparison;
+}
+
+std::string_view name_of(MatchedBy matched) {
+  switch (matched) {
+    case MatchedBy::name:
+      return "name";
+    case MatchedBy::number:
+      return "number";
+    case MatchedBy::nothing:
+      break;
+  }
+  return "";
 }
 
 std::string comparison_text(const LabelComparison& comparison) {
@@ -290,9 +381,10 @@ std::string comparison_text(const LabelComparison& comparison) {
       if (row.agreement.percentile95_mm)
         std::snprintf(most.data(), most.size(), "%.3f", *row.agreement.percentile95_mm);
       const bool other = row.name != row.truth;
-      std::snprintf(line.data(), line.size(), "           %6.4f  %7s  %7s  %7.2f  %7.2f  %s%s%s\n", row.agreement.dice,
-                    mean.data(), most.data(), row.volume_cm3, row.truth_cm3, row.name.c_str(), other ? ", with " : "",
-                    other ? row.truth.c_str() : "");
+      const std::string by(name_of(row.matched));
+      std::snprintf(line.data(), line.size(), "           %6.4f  %7s  %7s  %7.2f  %7.2f  %s%s%s%s%s\n",
+                    row.agreement.dice, mean.data(), most.data(), row.volume_cm3, row.truth_cm3, row.name.c_str(),
+                    other ? ", with " : "", other ? row.truth.c_str() : "", by.empty() ? "" : ", by ", by.c_str());
     }
     text += line.data();
   }

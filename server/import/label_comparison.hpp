@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "common/imaging/voxel_mask.hpp"
@@ -39,10 +40,16 @@ struct Agreement {
 [[nodiscard]] Result<Agreement> agreement_of(const imaging::VoxelMask& a, const imaging::VoxelMask& b,
                                              const Vec3& spacing_mm, const KeepGoing& keep_going);
 
+// How a label was found in the truth.
+enum class MatchedBy { nothing, name, number };
+// "name" or "number"; empty for nothing.
+[[nodiscard]] std::string_view name_of(MatchedBy matched);
+
 struct ComparedLabel {
-  int value = 0;      // of the case's label; 0: all bone
-  std::string name;   // of the case's label
-  std::string truth;  // name of the label that it is compared with; empty: there is none
+  int value = 0;                           // of the case's label; 0: several labels
+  std::string name;                        // of the case's label, or of a bone with a label for each tissue
+  std::string truth;                       // name of what it is compared with; empty: there is none
+  MatchedBy matched = MatchedBy::nothing;  // of all bone: nothing
   double volume_cm3 = 0.0, truth_cm3 = 0.0;
   Agreement agreement;  // only with a counterpart
 };
@@ -52,8 +59,10 @@ struct LabelComparison {
   std::vector<std::string> missing;   // labels of the truth without a counterpart in the case
 };
 
-// A label is compared with the one of the same name, or else with the one of the same number: that in its file if it
-// has one. Errors: exhausted, cancelled, internal.
+// A label is compared with what has the same words in its name: a label, or all tissues of a bone. Where the case or
+// the truth has no name but a number, as "bone 2" or "label 2", it is compared with the same number: that in its file
+// if it has one. In a truth with tissues, the number is the bone's place among its bones. What was found by name is not
+// found again by number. Errors: exhausted, cancelled, internal.
 [[nodiscard]] Result<LabelComparison> compare_labels(const CaseScan& scan, const std::vector<CaseLabel>& labels,
                                                      const TruthLabels& truth, const KeepGoing& keep_going);
 

@@ -13,6 +13,7 @@
 #include "server/import/dicom_segments.hpp"
 #include "server/import/found_files.hpp"
 #include "server/import/isolated_reader.hpp"
+#include "server/import/phantom_export.hpp"
 #include "server/import/volume_format.hpp"
 #include "server/import/volume_reader.hpp"
 
@@ -164,7 +165,15 @@ Result<LabelMap> read_dicom_segments(const fs::path& file, const KeepGoing& keep
 }
 
 Result<LabelMap> read_file(const fs::path& file, const KeepGoing& keep_going) {
-  if (volume_format(file) != VolumeFormat::none) return read_label_volume(file, keep_going);
+  if (volume_format(file) != VolumeFormat::none) {
+    auto map = read_label_volume(file, keep_going);
+    if (!map) return map;
+    const auto names = names_beside(file);
+    for (LabelSegment& segment : map->segments)
+      if (const auto name = names.find(segment.number); segment.name.empty() && name != names.end())
+        segment.name = name->second;
+    return map;
+  }
   const InputKind kind = input_kind(file, keep_going);
   if (!keep_going(0.0)) return stopped_while("reading the labels");
   if (kind == InputKind::dicom_file) return read_dicom_segments(file, keep_going);

@@ -32,10 +32,11 @@ struct LabelMap {
 };
 
 // `input`: a NIfTI, NRRD (also one of 3D Slicer's segmentations) or MetaImage file of labels; a DICOM SEG file of
-// binary segments; or a folder with one such file for each structure, named as the structure. Libraries read it in
-// another process. Values are whole numbers from 0 to 65535, and 0 is no structure.
-// Errors: not_found, invalid_input (truncated, damaged, other values, files of a folder on different voxels, no
-// structure at all), unsupported (fractional or compressed DICOM SEG, colours), exhausted, cancelled, internal.
+// binary segments; or a folder with one such file for each structure, named as the structure. The labels.nii.gz of a
+// phantom has the names of the truth.json beside it. Libraries read voxels in another process. Values are whole numbers
+// from 0 to 65535, and 0 is no structure. Errors: not_found, invalid_input (truncated, damaged, other values, files of
+// a folder on different voxels, no structure at all), unsupported (fractional or compressed DICOM SEG, colours),
+// exhausted, cancelled, internal.
 [[nodiscard]] Result<LabelMap> read_label_map(const std::filesystem::path& input, const KeepGoing& keep_going);
 
 }  // namespace osteon::import

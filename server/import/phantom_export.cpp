@@ -2,8 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <numbers>
+#include <system_error>
 
 #include "common/imaging/calibration.hpp"
 #include "common/runtime/files.hpp"
@@ -15,6 +18,9 @@ namespace {
 
 constexpr double kFieldAround_mm = 8.0;  // of a scan around the bone
 constexpr double kBlurReach = 5.0;       // of an edge's blur, in sigma
+constexpr const char* kTruthFile = "truth.json";
+constexpr const char* kTruthLabels = "labels.nii.gz";
+constexpr std::uintmax_t kLongestTruth = std::uintmax_t{1} << 20;  // bytes
 
 nlohmann::ordered_json numbers_of(const Vec3& v) { return {v.x(), v.y(), v.z()}; }
 
@@ -91,9 +97,26 @@ Result<void> write_truth(const phantoms::PhantomBone& bone, const phantoms::Bone
     truth["planes"][plane.name] = {{"point_mm", numbers_of(plane.point_mm)}, {"normal", numbers_of(plane.normal)}};
   for (const CaseLabel& label : info.labels) truth["labels"][label.name] = label.value;
   return write_new_folder(folder, [&](const std::filesystem::path& partial) -> Result<void> {
-    if (auto written = write_file(partial / "truth.json", truth.dump(1) + "\n"); !written) return written;
-    return write_labels(made.scan, info.labels, partial / "labels.nii.gz", keep_going);
+    if (auto written = write_file(partial / kTruthFile, truth.dump(1) + "\n"); !written) return written;
+    return write_labels(made.scan, info.labels, partial / kTruthLabels, keep_going);
   });
+}
+
+std::map<int, std::string> names_beside(const std::filesystem::path& labels) {
+  std::map<int, std::string> names;
+  const std::filesystem::path file = labels.parent_path() / kTruthFile;
+  std::error_code error;
+  if (labels.filename() != kTruthLabels || !std::filesystem::is_regular_file(file, error) ||
+      std::filesystem::file_size(file, error) > kLongestTruth)
+    return names;
+  const auto text = osteon::read_file(file);
+  if (!text) return names;
+  const auto truth = nlohmann::json::parse(*text, nullptr, false);
+  if (!truth.is_object() || !truth.contains("labels") || !truth["labels"].is_object()) return names;
+  for (const auto& [name, number] : truth["labels"].items())
+    if (number.is_number_integer() && number >= 1 && number <= std::numeric_limits<std::uint8_t>::max())
+      names.emplace(number.get<int>(), name);
+  return names;
 }
 
 }  // namespace osteon::import

@@ -1,6 +1,7 @@
 // A phantom bone as others see it: what a CT scanner shows, and the exact truth.
 #pragma once
 #include <filesystem>
+#include <map>
 #include <string>
 
 #include "common/phantoms/phantom_case.hpp"
@@ -27,5 +28,9 @@ inline constexpr double kAroundBone_hu = 40.0;
 [[nodiscard]] Result<void> write_truth(const phantoms::PhantomBone& bone, const phantoms::BoneRecipe& recipe,
                                        const phantoms::PhantomCase& made, const std::filesystem::path& folder,
                                        const KeepGoing& keep_going);
+
+// The names of labels by their numbers, from the truth.json beside the labels.nii.gz of write_truth(). Empty for other
+// files, and where truth.json is missing or is not one of a phantom bone: names are never needed to read the voxels.
+[[nodiscard]] std::map<int, std::string> names_beside(const std::filesystem::path& labels);
 
 }  // namespace osteon::import

@@ -328,6 +328,7 @@ nlohmann::json json_of(const LabelComparison& comparison) {
     nlohmann::json one{{"label", row.name}, {"value", row.value}, {"volume_cm3", row.volume_cm3}};
     one["truth"] = row.truth.empty() ? nlohmann::json(nullptr) : nlohmann::json(row.truth);
     if (!row.truth.empty()) {
+      if (row.matched != MatchedBy::nothing) one["matched_by"] = name_of(row.matched);
       one["truth_volume_cm3"] = row.truth_cm3;
       one["dice"] = row.agreement.dice;
       one["mean_surface_distance_mm"] = or_null(row.agreement.mean_mm);

@@ -116,7 +116,7 @@ Result<std::string> parts_table(const ReportFacts& facts) {
       std::array<char, 96> swatch{};
       std::snprintf(swatch.data(), swatch.size(), "<span class=\"swatch\" style=\"background:#%02x%02x%02x\"></span>",
                     part.colour->red, part.colour->green, part.colour->blue);
-      name = swatch.data() + name;
+      name.insert(0, swatch.data());
     }
     if (!part.kind.empty() && part.kind != "bone") name += " (" + escaped(part.kind) + ")";
     std::array<char, 64> centre{};
@@ -134,7 +134,7 @@ Result<std::string> parts_table(const ReportFacts& facts) {
 
 std::string comparison_table(const LabelComparison& comparison) {
   std::string text =
-      "<h2>Compared with other labels</h2>\n<table>\n<tr><th>Label</th><th>With</th>"
+      "<h2>Compared with other labels</h2>\n<table>\n<tr><th>Label</th><th>With</th><th>Found by</th>"
       "<th class=\"number\">Dice</th><th class=\"number\">Mean distance, mm</th>"
       "<th class=\"number\">95 % distance, mm</th><th class=\"number\">Volume, cm³</th>"
       "<th class=\"number\">Its volume, cm³</th></tr>\n";
@@ -142,6 +142,7 @@ std::string comparison_table(const LabelComparison& comparison) {
     const bool found = !label.truth.empty();
     const std::string truth_cm3 = found ? number("%.2f", label.truth_cm3) : "–";
     text += "<tr>" + cell(escaped(label.name)) + cell(found ? escaped(label.truth) : "no such label") +
+            cell(std::string(name_of(label.matched))) +
             number_cell(found ? number("%.4f", label.agreement.dice) : "–") +
             number_cell(number("%.3f", label.agreement.mean_mm)) +
             number_cell(number("%.3f", label.agreement.percentile95_mm)) +
@@ -187,7 +188,7 @@ Result<std::string> to_html(const ReportFacts& facts, const ReportImages& images
   if (!images.islands.empty())
     text += "<h2>All islands of bone</h2>\n" + image(images.islands, "All islands from the front and from the left") +
             "<p class=\"note\">Grey islands were left out. Numbers are those of the table and of --keep.</p>\n";
-  const auto parts = parts_table(facts);
+  auto parts = parts_table(facts);
   if (!parts) return parts;
   text += *parts + list_of("Left out", facts.left_out);
   if (!images.histogram.empty())

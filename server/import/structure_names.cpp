@@ -43,7 +43,7 @@ constexpr std::string_view kMetal[] = {"metal",    "implant", "implants", "screw
                                        "titanium", "cup",     "filling",  "clip",  "endoprosthesis", "bridge"};
 constexpr std::string_view kEnamel[] = {"enamel"};
 constexpr std::string_view kCortical[] = {"cortical", "cortex", "corticalis", "compacta"};
-constexpr std::string_view kCancellous[] = {"cancellous", "trabecular", "spongiosa", "spongious", "spongy"};
+constexpr std::string_view kCancellous[] = {"cancellous", "trabecular", "spongiosa", "spongious", "spongy", "marrow"};
 constexpr std::string_view kSoftTissue[] = {"brain",   "cerebrum", "cerebellum", "brainstem", "eye",      "eyes",
                                             "eyeball", "trachea",  "esophagus",  "pharynx",   "cochlea",  "labyrinth",
                                             "tendon",  "tendons",  "ligament",   "ligaments", "cochleae", "larynx",
@@ -111,7 +111,7 @@ constexpr std::string_view kPlace[] = {"left",        "right",
                                        "splenic",     "structure",
                                        "entire",      "fragment",
                                        "fragments",   "piece",
-                                       "part",        "marrow",
+                                       "part",        "acetabular",
                                        "mandibular",  "maxillary",
                                        "vertebral",   "intervertebral",
                                        "popliteal",   "tibial",
@@ -151,7 +151,8 @@ constexpr std::string_view kPlace[] = {"left",        "right",
                                        "vertebralis", "temporale",
                                        "frontale",    "parietale",
                                        "occipitale",  "nasale",
-                                       "inferius"};
+                                       "inferius",    "patellar",
+                                       "cruciate",    "collateral"};
 
 constexpr Words kWords[] = {{Word::nerve, kNerve},
                             {Word::vessel, kVessel},
@@ -170,40 +171,16 @@ struct WholeName {
   std::string_view name;
   Word word;
 };
-constexpr WholeName kWholeNames[] = {{"sigmoid sinus", Word::vessel},
-                                     {"transverse sinus", Word::vessel},
-                                     {"sagittal sinus", Word::vessel},
-                                     {"superior sagittal sinus", Word::vessel},
-                                     {"venous sinuses", Word::vessel},
-                                     {"soft palate", Word::left_out},
-                                     {"vertebral body", Word::bone},
-                                     {"vertebrae body", Word::bone},
-                                     {"zygomatic process", Word::bone},
-                                     {"styloid process", Word::bone},
-                                     {"femoral head", Word::bone},
-                                     {"femoral shaft", Word::bone},
-                                     {"humeral head", Word::bone},
-                                     {"spinal canal", Word::nerve},
-                                     {"bone marrow", Word::cancellous},
-                                     {"mandibular canal", Word::nerve},
-                                     {"inferior alveolar canal", Word::nerve},
-                                     {"aortic arch", Word::vessel},
-                                     {"soft tissue", Word::left_out},
+constexpr WholeName kWholeNames[] = {{"sigmoid sinus", Word::vessel},   {"transverse sinus", Word::vessel},
+                                     {"sagittal sinus", Word::vessel},  {"superior sagittal sinus", Word::vessel},
+                                     {"venous sinuses", Word::vessel},  {"soft palate", Word::left_out},
+                                     {"vertebral body", Word::bone},    {"vertebrae body", Word::bone},
+                                     {"zygomatic process", Word::bone}, {"styloid process", Word::bone},
+                                     {"femoral head", Word::bone},      {"femoral shaft", Word::bone},
+                                     {"humeral head", Word::bone},      {"spinal canal", Word::nerve},
+                                     {"mandibular canal", Word::nerve}, {"inferior alveolar canal", Word::nerve},
+                                     {"aortic arch", Word::vessel},     {"soft tissue", Word::left_out},
                                      {"tissue", Word::left_out}};
-
-// Lower-case words: letters and digits, whatever stands between them.
-std::vector<std::string> words_of(std::string_view name) {
-  std::vector<std::string> words(1);
-  for (const char c : name) {
-    const auto letter = static_cast<unsigned char>(c);
-    if (std::isalnum(letter) != 0 || letter >= 0x80)
-      words.back() += static_cast<char>(std::tolower(letter));
-    else if (!words.back().empty())
-      words.emplace_back();
-  }
-  if (words.back().empty()) words.pop_back();
-  return words;
-}
 
 bool all_digits(std::string_view text) {
   return std::ranges::all_of(text, [](unsigned char c) { return std::isdigit(c) != 0; });
@@ -353,6 +330,24 @@ Result<std::pair<std::string, Structure>> parse_name(std::string_view text) {
 bool is_carved(LabelKind kind) {
   return kind == LabelKind::bone || kind == LabelKind::cortical || kind == LabelKind::cancellous ||
          kind == LabelKind::metal || kind == LabelKind::enamel;
+}
+
+std::vector<std::string> words_of(std::string_view name) {
+  std::vector<std::string> words(1);
+  for (const char c : name) {
+    const auto letter = static_cast<unsigned char>(c);
+    if (std::isalnum(letter) != 0 || letter >= 0x80)
+      words.back() += static_cast<char>(std::tolower(letter));
+    else if (!words.back().empty())
+      words.emplace_back();
+  }
+  if (words.back().empty()) words.pop_back();
+  return words;
+}
+
+bool is_tissue_word(std::string_view word) {
+  const std::optional<Word> meaning = meaning_of(word);
+  return meaning == Word::cortical || meaning == Word::cancellous;
 }
 
 std::optional<Structure> known_structure(std::string_view name) {

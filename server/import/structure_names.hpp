@@ -20,6 +20,11 @@ struct Structure {
 // the case's scan has.
 [[nodiscard]] bool is_carved(LabelKind kind);
 
+// The words of a name in small letters: letters and digits, whatever stands between them.
+[[nodiscard]] std::vector<std::string> words_of(std::string_view name);
+// Whether a small word names a tissue of bone, such as cortical, cancellous or marrow.
+[[nodiscard]] bool is_tissue_word(std::string_view word);
+
 // The structure that a name means, by its words: English and Latin names of bones, nerves, vessels, organs and muscles
 // in any order, with sides, levels such as L1, and numbers. All classes of TotalSegmentator's task "total" are known.
 // Nothing if any word is unknown, so the name of a person is never taken for that of a structure.

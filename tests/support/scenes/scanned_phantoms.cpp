@@ -25,7 +25,8 @@ void visit_samples(const CoordBox& box, Visit visit) {
       for (int z = box.min.z; z <= box.max.z; ++z) visit(Coord{x, y, z}, position_mm({x, y, z}, kSample_mm));
 }
 
-// A point deep in the cortex of a bone, far from the ends of a tilted scan.
+}  // namespace
+
 Vec3 cortex_of(const phantoms::PhantomBone& bone, int number) {
   constexpr int kFromEnds = 45;
   CoordBox box = covering_samples(bone.bounds(), kSample_mm);
@@ -42,8 +43,6 @@ Vec3 cortex_of(const phantoms::PhantomBone& bone, int number) {
   });
   return found;
 }
-
-}  // namespace
 
 Result<import::CtImport> scanned_and_imported(const phantoms::PhantomBone& shown, const phantoms::PhantomBone& around,
                                               const import::CtOptions& options, const std::filesystem::path& folder) {

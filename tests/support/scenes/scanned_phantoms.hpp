@@ -27,6 +27,9 @@ struct PhantomAgreement {
                                                          const import::CtOptions& options,
                                                          const std::filesystem::path& folder);
 
+// A point deep in the cortex of a bone, far from the ends of a tilted scan. `number`: of the bone.
+[[nodiscard]] Vec3 cortex_of(const phantoms::PhantomBone& bone, int number);
+
 struct BoneSeed {
   Vec3 at_mm = Vec3::Zero();
   int bone = 0;  // its number

@@ -137,22 +137,117 @@ TEST(CompareLabels, FindsThemByNameAndThenByNumber) {
   l.draw(7, 8, 1, 9);
   l.draw(9, 10, 2, 2);
   l.draw(11, 12, 3, 0);
-  l.truth.labels = {{2, "something"}, {9, "Femur"}, {5, "patella"}};
+  l.truth.labels = {{2, "label 2"}, {9, "Femur"}, {5, "patella"}};
   const std::vector<CaseLabel> labels{{1, "femur"}, {2, "tibia"}, {3, "fibula"}};
   const auto found = compare_labels(l.scan(), labels, l.truth, keep_going);
   ASSERT_TRUE(found) << found.error().message;
   ASSERT_EQ(found->labels.size(), 4u);
   EXPECT_EQ(found->labels[0].truth, "Femur");
   EXPECT_EQ(found->labels[0].agreement.dice, 1.0);
-  EXPECT_EQ(found->labels[1].truth, "something");
+  EXPECT_EQ(found->labels[0].matched, MatchedBy::name);
+  EXPECT_EQ(found->labels[1].truth, "label 2");
+  EXPECT_EQ(found->labels[1].matched, MatchedBy::number);
   EXPECT_EQ(found->labels[1].agreement.dice, 1.0);
   EXPECT_EQ(found->labels[2].truth, "");
+  EXPECT_EQ(found->labels[2].matched, MatchedBy::nothing);
   EXPECT_EQ(found->labels[3].name, "all bone");
   EXPECT_NEAR(found->labels[3].agreement.dice, 2.0 * 4.0 / (6.0 + 4.0), 1e-12);
   EXPECT_EQ(found->missing, std::vector<std::string>{"patella"});
   const std::string text = comparison_text(*found);
   EXPECT_NE(text.find("fibula: the truth has no such label"), std::string::npos) << text;
   EXPECT_NE(text.find("the case has no patella"), std::string::npos) << text;
+  EXPECT_NE(text.find("  femur, with Femur, by name\n"), std::string::npos) << text;
+  EXPECT_NE(text.find("  tibia, with label 2, by number\n"), std::string::npos) << text;
+}
+
+TEST(CompareLabels, NamesDecideWhereBothHaveOne) {
+  TwoLabellings l;
+  l.draw(7, 8, 1, 2);
+  l.draw(9, 10, 2, 1);
+  l.draw(11, 12, 3, 3);
+  l.truth.labels = {{1, "tibia_left"}, {2, "Femur, left"}, {3, "patella"}};
+  const auto found =
+      compare_labels(l.scan(), {{1, "left femur"}, {2, "left tibia"}, {3, "fibula"}}, l.truth, keep_going);
+  ASSERT_TRUE(found) << found.error().message;
+  for (const auto& [row, name] : {std::pair{0, "Femur, left"}, std::pair{1, "tibia_left"}}) {
+    const ComparedLabel& label = found->labels[static_cast<std::size_t>(row)];
+    EXPECT_EQ(label.truth, name);
+    EXPECT_EQ(label.matched, MatchedBy::name);
+    EXPECT_EQ(label.agreement.dice, 1.0) << name;
+  }
+  EXPECT_EQ(found->labels[2].truth, "") << "number 3 is another bone by its name";
+  EXPECT_EQ(found->missing, std::vector<std::string>{"patella"});
+}
+
+// What one label found by its name is not found again by the number of another.
+TEST(CompareLabels, ANumberDoesNotTakeWhatANameHas) {
+  TwoLabellings l;
+  l.draw(7, 8, 1, 2);
+  l.draw(9, 10, 2, 0);
+  l.truth.labels = {{2, "femur"}};
+  const auto found = compare_labels(l.scan(), {{1, "femur"}, {2, "bone 2"}}, l.truth, keep_going);
+  ASSERT_TRUE(found) << found.error().message;
+  EXPECT_EQ(found->labels[0].truth, "femur");
+  EXPECT_EQ(found->labels[1].truth, "");
+}
+
+// A knee's truth has a label for each tissue. Its bones are those of the case, by name or by their place.
+TEST(CompareLabels, TissuesOfABoneCountTogether) {
+  TwoLabellings l;
+  l.draw(7, 7, 1, 1);
+  l.draw(8, 8, 1, 2);
+  l.draw(9, 9, 2, 4);
+  l.draw(10, 10, 2, 5);
+  l.draw(11, 11, 2, 6);
+  l.draw(12, 12, 0, 8);
+  l.truth.labels = {{1, "femur, cortical", LabelKind::cortical}, {2, "femur, cancellous", LabelKind::cancellous},
+                    {4, "tibia, cortical", LabelKind::cortical}, {5, "tibia, cancellous", LabelKind::cancellous},
+                    {6, "tibia, marrow", LabelKind::cancellous}, {8, "tibial cartilage", LabelKind::cartilage}};
+  const std::vector<CaseLabel> numbered{{1, "bone 1"}, {2, "bone 2"}}, named{{1, "femur"}, {2, "Tibia"}};
+  for (const bool by_name : {true, false}) {
+    const auto found = compare_labels(l.scan(), by_name ? named : numbered, l.truth, keep_going);
+    ASSERT_TRUE(found) << found.error().message;
+    ASSERT_EQ(found->labels.size(), 3u);
+    for (const std::size_t row : {0u, 1u}) {
+      EXPECT_EQ(found->labels[row].truth, row == 0 ? "femur" : "tibia");
+      EXPECT_EQ(found->labels[row].matched, by_name ? MatchedBy::name : MatchedBy::number);
+      EXPECT_EQ(found->labels[row].agreement.dice, 1.0);
+    }
+    EXPECT_EQ(found->missing, std::vector<std::string>{"tibial cartilage"});
+  }
+}
+
+// The other way round: the case tells tissues apart, and the truth does not.
+TEST(CompareLabels, TissuesOfTheCaseCountTogetherToo) {
+  TwoLabellings l;
+  l.draw(7, 7, 1, 3);
+  l.draw(8, 9, 2, 3);
+  l.draw(10, 10, 0, 3);
+  l.truth.labels = {{3, "femur"}};
+  const auto found = compare_labels(
+      l.scan(), {{1, "femur, cortical", LabelKind::cortical}, {2, "femur, cancellous", LabelKind::cancellous}}, l.truth,
+      keep_going);
+  ASSERT_TRUE(found) << found.error().message;
+  ASSERT_EQ(found->labels.size(), 4u);
+  EXPECT_EQ(found->labels[0].truth, "");
+  EXPECT_EQ(found->labels[1].truth, "");
+  EXPECT_EQ(found->labels[2].name, "femur");
+  EXPECT_EQ(found->labels[2].truth, "femur");
+  EXPECT_NEAR(found->labels[2].agreement.dice, 2.0 * 3.0 / (3.0 + 4.0), 1e-12);
+  EXPECT_TRUE(found->missing.empty());
+}
+
+// Labels of one bone without its name, as a phantom of one bone has them.
+TEST(CompareLabels, TissuesWithoutANameAreOneBone) {
+  TwoLabellings l;
+  l.draw(7, 8, 1, 1);
+  l.draw(9, 10, 1, 2);
+  l.truth.labels = {{1, "cortical", LabelKind::cortical}, {2, "marrow", LabelKind::cancellous}};
+  const auto found = compare_labels(l.scan(), {{1, "bone 1"}}, l.truth, keep_going);
+  ASSERT_TRUE(found) << found.error().message;
+  EXPECT_EQ(found->labels[0].truth, "bone");
+  EXPECT_EQ(found->labels[0].agreement.dice, 1.0);
+  EXPECT_TRUE(found->missing.empty());
 }
 
 // Bone that the case left out together with its part of the scan is missing all the same.
@@ -188,7 +283,7 @@ TEST(CompareLabels, TheProgramPrintsIt) {
   // 16 columns, of which the truth has 8.
   EXPECT_NE(made.out.find("truth        Dice"), std::string::npos) << made.out;
   EXPECT_NE(made.out.find("           0.6667  "), std::string::npos) << made.out;
-  EXPECT_NE(made.out.find("bone 1, with label 1"), std::string::npos) << made.out;
+  EXPECT_NE(made.out.find("bone 1, with label 1, by number"), std::string::npos) << made.out;
   EXPECT_NE(made.out.find("all bone"), std::string::npos) << made.out;
 }
 

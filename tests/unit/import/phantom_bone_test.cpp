@@ -13,6 +13,7 @@
 #include "server/import/dicom_reader.hpp"
 #include "server/import/label_map.hpp"
 #include "server/import/phantom_export.hpp"
+#include "server/import/structure_names.hpp"
 #include "tests/support/process.hpp"
 #include "tests/support/scenes/scanned_phantoms.hpp"
 #include "tests/support/temp_dir.hpp"
@@ -165,6 +166,82 @@ TEST(PhantomProgram, RefusesInOneSentenceAndWritesNothing) {
   EXPECT_NE(run.exit_code, 0);
   EXPECT_NE(run.err.find("cannot make the folder " + file + "/case: Not a directory; choose"), std::string::npos)
       << run.err;
+}
+
+// Names in truth.json are those of known structures, so that an import with the truth knows all its labels.
+TEST(PhantomLabels, AreStructuresThatTheImportKnows) {
+  for (const std::string_view kind : phantoms::kBoneKinds) {
+    const auto bone = phantoms::make_bone({.kind = std::string(kind)});
+    ASSERT_TRUE(bone) << bone.error().message;
+    const auto made =
+        phantoms::build_phantom_case(**bone, {.pitch_mm = 2.0, .calibration = imaging::kRho1995}, keep_going);
+    ASSERT_TRUE(made) << made.error().message;
+    ASSERT_GT(made->bone.info().labels.size(), 2u);
+    for (const CaseLabel& label : made->bone.info().labels) {
+      const auto known = known_structure(label.name);
+      ASSERT_TRUE(known) << label.name;
+      EXPECT_EQ(known->kind, label.kind) << label.name;
+    }
+  }
+}
+
+TEST(PhantomLabels, HaveNoNamesWithoutAGoodFileBesideThem) {
+  const test::TempDir folder;
+  const fs::path labels = folder / "labels.nii.gz";
+  const auto names = [&](const std::string& text) {
+    std::ofstream(folder / "truth.json") << text;
+    return names_beside(labels);
+  };
+  EXPECT_TRUE(names_beside(labels).empty());
+  EXPECT_EQ(names(R"({"labels": {"cortical": 1, "marrow": 3}})"),
+            (std::map<int, std::string>{{1, "cortical"}, {3, "marrow"}}));
+  EXPECT_TRUE(names_beside(folder / "others.nii.gz").empty());
+  for (const char* text : {"", "{", "[]", "{}", R"({"labels": ["cortical"]})", R"({"labels": {"cortical": "1"}})",
+                           R"({"labels": {"a": 0, "b": 256, "c": 1.5, "d": -1, "e": 1e99}})"})
+    EXPECT_TRUE(names(text).empty()) << text;
+}
+
+// A knee through the scanner, with a seed in each bone: its truth is compared bone by bone.
+TEST(PhantomProgram, AKneeIsComparedWithItsTruthBoneByBone) {
+  const test::TempDir folder;
+  const auto path = [&](const char* name) { return (folder / name).string(); };
+  std::ofstream(folder / "short.yaml") << "parameters: {femur_cut_mm: 75, tibia_cut_mm: 75}\n";
+  const auto made =
+      test::run(OSTEON_IMPORT_PROGRAM,
+                {"phantom", "knee", "--parameters", path("short.yaml"), "--pitch", "1.5", "--out", path("knee"),
+                 "--dicom", path("ct"), "--pixel", "1.2", "--slice", "1.5", "--noise", "0", "--truth", path("truth")});
+  ASSERT_EQ(made.exit_code, 0) << made.err;
+  const auto knee = phantoms::make_bone({.kind = "knee", .changes = {{"femur_cut_mm", 75.0}, {"tibia_cut_mm", 75.0}}});
+  ASSERT_TRUE(knee) << knee.error().message;
+  std::vector<std::string> arguments{"ct",           path("ct"),   "--separate",
+                                     "--out",        path("back"), "--report",
+                                     path("report"), "--truth",    path("truth/labels.nii.gz")};
+  for (int bone = 1; bone <= 4; ++bone) {
+    const Vec3 at = test::cortex_of(**knee, bone);
+    arguments.insert(arguments.end(),
+                     {"--seed", std::to_string(at.x()) + "," + std::to_string(at.y()) + "," + std::to_string(at.z())});
+  }
+  const auto back = test::run(OSTEON_IMPORT_PROGRAM, arguments);
+  ASSERT_EQ(back.exit_code, 0) << back.err;
+  std::printf("%s", back.out.c_str());
+  std::ifstream file(folder / "report/report.json");
+  const auto rows = nlohmann::json::parse(file)["comparison"]["labels"];
+  ASSERT_EQ(rows.size(), 5u) << back.out;
+  for (std::size_t bone = 0; bone < 4; ++bone) {
+    EXPECT_EQ(rows[bone]["truth"], (*knee)->names()[bone]);
+    EXPECT_EQ(rows[bone]["matched_by"], "number");
+    EXPECT_GT(rows[bone]["dice"], 0.94) << rows[bone];
+    EXPECT_NE(back.out.find("bone " + std::to_string(bone + 1) + ", with " + (*knee)->names()[bone] + ", by number"),
+              std::string::npos)
+        << back.out;
+  }
+  EXPECT_GT(rows[4]["dice"], 0.95) << "soft tissue is no bone of the truth";
+
+  // The truth as labels: a case with names.
+  const auto named = test::run(OSTEON_IMPORT_PROGRAM, {"ct", path("ct"), "--labels", path("truth/labels.nii.gz"),
+                                                       "--out", path("named"), "--truth", path("truth/labels.nii.gz")});
+  ASSERT_EQ(named.exit_code, 0) << named.err;
+  EXPECT_NE(named.out.find("  tibia, cortical, by name\n"), std::string::npos) << named.out;
 }
 
 test::PhantomAgreement agreement_of(const phantoms::BoneRecipe& recipe, const CtOptions& options) {

@@ -206,6 +206,11 @@ TEST_F(Report, NamesStructuresAtRisk) {
   for (const auto& row : report.at("comparison").at("labels")) {
     EXPECT_EQ(row.at("dice"), 1.0) << row;
     EXPECT_EQ(row.at("mean_surface_distance_mm"), 0.0) << row;
+    if (row.at("label") == "all bone") {
+      EXPECT_FALSE(row.contains("matched_by"));
+    } else {
+      EXPECT_EQ(row.at("matched_by"), "name") << row;
+    }
   }
   EXPECT_EQ(report.at("comparison").at("labels").size(), 3u) << "both, and all bone";
   const std::string html = test::content(folder_ / "report" / "report.html");
@@ -296,6 +301,9 @@ TEST_F(Report, TheTruthsOwnNamesAreNotTaken) {
   EXPECT_EQ(test::content(folder_ / "report" / "report.json").find("Doe"), std::string::npos);
   const nlohmann::json row = facts().at("comparison").at("labels")[0];
   EXPECT_EQ(row.at("truth"), "label 1");
+  EXPECT_EQ(row.at("matched_by"), "number");
+  EXPECT_NE(test::content(folder_ / "report" / "report.html").find("<td>label 1</td><td>number</td>"),
+            std::string::npos);
   EXPECT_EQ(row.at("dice"), 1.0);
 }
 

@@ -92,6 +92,15 @@ TEST(Hip, EveryPresetIsTwoBonesThatEndAtTheCut) {
   }
 }
 
+TEST(Hip, RandomHipsAreTwoClosedPiecesEach) {
+  test::Random random(73);
+  for (int set = 0; set < random_sets(); ++set) {
+    const auto hip = random_bone("hip", 0.05, random);
+    ASSERT_TRUE(hip);
+    EXPECT_EQ(islands_of(*hip, 3.0), (std::vector<int>{1, 1})) << "set " << set;
+  }
+}
+
 TEST(Hip, RecipesThatDoNotFitAreOneSentence) {
   const auto refused = [](const std::string& name, double value, const std::string& also) {
     expect_refused("hip", name, value, also);

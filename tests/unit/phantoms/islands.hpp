@@ -1,6 +1,9 @@
 // How many pieces of solid samples there are in a box.
 #pragma once
+#include <cstdio>
 #include <span>
+#include <sstream>
+#include <string>
 #include <vector>
 
 #include "common/geometry/lattice.hpp"
@@ -8,8 +11,16 @@
 
 namespace osteon::phantoms {
 
+// Islands are counted again on finer lattices down to about this one, because bone may be thinner than a coarse one.
+inline constexpr double kFinest_mm = 1.0;
+
+struct Island {
+  Coord first;  // of its samples
+  int samples = 0;
+};
+
 // Samples below 0 that share faces are one piece. z fastest.
-[[nodiscard]] inline int count_islands(Coord dims, std::span<const float> solid_mm) {
+[[nodiscard]] inline std::vector<Island> find_islands(Coord dims, std::span<const float> solid_mm) {
   std::vector<bool> seen(solid_mm.size(), false);
   std::vector<Coord> open;
   const auto index = [&](Coord c) {
@@ -22,14 +33,15 @@ namespace osteon::phantoms {
     open.push_back(c);
     return true;
   };
-  int islands = 0;
+  std::vector<Island> islands;
   for (int x = 0; x < dims.x; ++x)
     for (int y = 0; y < dims.y; ++y)
       for (int z = 0; z < dims.z; ++z) {
-        islands += visit({x, y, z}) ? 1 : 0;
+        if (visit({x, y, z})) islands.push_back({{x, y, z}, 0});
         while (!open.empty()) {
           const Coord c = open.back();
           open.pop_back();
+          ++islands.back().samples;
           for (const Coord step : {Coord{1, 0, 0}, Coord{0, 1, 0}, Coord{0, 0, 1}}) {
             visit(c + step);
             visit(c - step);
@@ -37,6 +49,21 @@ namespace osteon::phantoms {
         }
       }
   return islands;
+}
+
+[[nodiscard]] inline int count_islands(Coord dims, std::span<const float> solid_mm) {
+  return static_cast<int>(find_islands(dims, solid_mm).size());
+}
+
+// Where the islands are, and the parameters of a bone that has them.
+[[nodiscard]] inline std::string islands_text(const PhantomBone& bone, const std::vector<Island>& islands,
+                                              const Coord& from, double pitch_mm) {
+  std::ostringstream text;
+  for (const Island& island : islands)
+    text << island.samples << " samples of " << pitch_mm << " mm from "
+         << position_mm(from + island.first, pitch_mm).transpose() << " mm\n";
+  for (const NamedValue& value : bone.parameters()) text << value.name << ": " << value.value << "\n";
+  return text.str();
 }
 
 // Pieces of each bone on a coarse lattice around the phantom. Empty if a solid sample lies at the lattice's end,
@@ -56,7 +83,12 @@ namespace osteon::phantoms {
         if (at_end && at.surface_mm < 0.0) return {};
       }
   std::vector<int> islands;
-  for (const std::vector<float>& one : solid) islands.push_back(count_islands(box.dims(), one));
+  for (const std::vector<float>& one : solid) {
+    const std::vector<Island> found = find_islands(box.dims(), one);
+    if (found.size() > 1 && pitch_mm > kFinest_mm) return islands_of(bone, 0.6 * pitch_mm);
+    if (found.size() != 1) std::printf("%s", islands_text(bone, found, box.min, pitch_mm).c_str());
+    islands.push_back(static_cast<int>(found.size()));
+  }
   return islands;
 }
 

@@ -156,7 +156,7 @@ TEST(Knee, EveryPresetAndRandomSetIsFourClosedPieces) {
       }
     }
   test::Random random(72);
-  for (int set = 0; set < 20; ++set) {
+  for (int set = 0; set < random_sets(); ++set) {
     const auto knee = random_bone("knee", 0.05, random);
     ASSERT_TRUE(knee);
     EXPECT_EQ(islands_of(*knee, 3.5), kFourPieces) << set;

@@ -13,6 +13,7 @@
 #include "common/phantoms/bone_parameters.hpp"
 #include "common/phantoms/phantom_bone.hpp"
 #include "tests/support/scenes/random.hpp"
+#include "tests/support/trials.hpp"
 
 namespace osteon::phantoms {
 
@@ -49,6 +50,9 @@ void expect_ranges(const std::string& kind, std::span<const ParameterField<Param
                                field.most + 0.01 * std::max(1.0, field.most), std::nan("")})
       expect_refused(kind, std::string(field.name), value, "give a value from");
 }
+
+// How many random sets of parameters a test of a kind of bone makes.
+inline int random_sets() { return static_cast<int>(test::trials(200, 20)); }
 
 // A bone of random words and parameters; those that do not fit together are drawn again. Each is up to `spread` away
 // from the preset. Cartilage keeps the thickness that follows from the others.

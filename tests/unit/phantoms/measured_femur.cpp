@@ -389,6 +389,20 @@ double BoneView::cortex_mm(const Vec3& from, const Vec3& direction, double thick
   return depth;
 }
 
+int bone_beside(const Case& bone, const Vec3& at_mm) {
+  const Eigen::Vector3i near = (at_mm / bone.pitch_mm()).array().round().cast<int>();
+  const Coord at{near.x(), near.y(), near.z()};
+  Coord deepest = at;
+  double least = std::numeric_limits<double>::infinity();
+  for (const Coord step : {Coord{0, 0, 0}, Coord{1, 0, 0}, Coord{0, 1, 0}, Coord{0, 0, 1}})
+    for (const Coord sample : {at + step, at - step})
+      if (const double depth = bone.surface_mm(position_mm(sample, bone.pitch_mm())); depth < least) {
+        least = depth;
+        deepest = sample;
+      }
+  return bone.bone_number(deepest);
+}
+
 Ball fitted_ball(const std::vector<Vec3>& points) {
   // |p|² = 2 c·p + (r² - c²) is linear in c and in the last term.
   Eigen::MatrixXd rows(static_cast<Eigen::Index>(points.size()), 4);

@@ -31,6 +31,10 @@ class BoneView {
   double side_;
 };
 
+// The number of the bone that has a point of the surface: that of the deepest sample around it. Samples outside of bone
+// may have any number.
+[[nodiscard]] int bone_beside(const Case& bone, const Vec3& at_mm);
+
 struct Ball {
   Vec3 centre = Vec3::Zero();
   double radius = 0.0;

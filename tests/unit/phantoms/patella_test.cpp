@@ -58,7 +58,7 @@ TEST(Patella, EveryPresetAndRandomSetIsOneClosedPiece) {
       EXPECT_EQ(islands_of(*bone, 1.0), std::vector<int>{1}) << preset << " " << condition;
     }
   test::Random random(33);
-  for (int set = 0; set < 30; ++set) {
+  for (int set = 0; set < random_sets(); ++set) {
     const auto bone = random_bone("patella", 0.15, random);
     ASSERT_TRUE(bone);
     EXPECT_EQ(islands_of(*bone, 1.0), std::vector<int>{1}) << set;

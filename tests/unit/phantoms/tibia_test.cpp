@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "tests/support/scenes/random.hpp"
+#include "tests/unit/phantoms/islands.hpp"
 #include "tests/unit/phantoms/made_bones.hpp"
 
 namespace osteon::phantoms {
@@ -72,6 +73,19 @@ TEST(Tibia, EveryPresetIsATibiaWhoseBonesDoNotTouch) {
               }
           }
     }
+}
+
+TEST(Tibia, RandomTibiaeAreTwoClosedPiecesEach) {
+  test::Random random(43);
+  for (int set = 0; set < random_sets(); ++set) {
+    const auto bone = random_bone("tibia", 0.08, random);
+    ASSERT_TRUE(bone);
+    ASSERT_EQ(islands_of(*bone, 3.0), (std::vector<int>{1, 1})) << "set " << set;
+    for (const Landmark& found : bone->anatomy().landmarks)
+      if (found.name.find("centre") == std::string::npos) {
+        EXPECT_NEAR(bone->depths(found.point_mm).surface_mm, 0.0, 0.3) << found.name << ", set " << set;
+      }
+  }
 }
 
 TEST(Tibia, ImpossibleParametersAreOneSentence) {
