@@ -12,7 +12,7 @@
 namespace osteon::phantoms {
 
 // Islands are counted again on finer lattices down to about this one, because bone may be thinner than a coarse one.
-inline constexpr double kFinest_mm = 1.0;
+inline constexpr double kFinest_mm = 0.6;
 
 struct Island {
   Coord first;  // of its samples
