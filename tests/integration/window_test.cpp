@@ -200,7 +200,8 @@ TEST_F(WindowTest, AMouseDrillsTheBoneAndUndoBringsItBack) {
   const auto state = [&] { return view_->updater()->states().front(); };
   ASSERT_FALSE(view_->updater()->states().empty());
   EXPECT_EQ(state().tool_name, "drill-3.2");
-  // The tool comes out again by itself.
+  // The tool comes out of the hole by itself, and rests on whole bone beside it.
+  hover(middle() + QPoint(80, 0));
   EXPECT_TRUE(until([&] { return state().pose_bone_tool.position_mm.z() > 0.1; }));
   // One undo takes back the whole push.
   trigger("undo");
