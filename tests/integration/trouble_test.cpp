@@ -82,6 +82,21 @@ TEST(Trouble, WithoutAServerEveryClientSaysSo) {
   expect_one_sentence(
       run(program("osteon-viewer"), {"--server", nobody, "--plain", "--timeout", "1"}, 60s, screen->options()),
       "osteon-viewer", {nobody, "osteon-server"});
+  expect_one_sentence(run(program("osteon-server"), {"rooms", "list", "--server", nobody, "--plain", "--timeout", "1"}),
+                      "osteon-server", {nobody, "osteon-server"});
+}
+
+// A server on a slow machine listens later than somebody asks it. Without --timeout the command waits 5 s.
+TEST(Trouble, ACommandWaitsForAServerThatListensLater) {
+  Stage stage(8.0);
+  const std::string address = stage.address();
+  ASSERT_EQ(stage.server().terminate(30s), 0) << stage.server().err();
+  Process list = stage.start("osteon-server", {"rooms", "list", "--server", address, "--plain", "--timeout", "250"});
+  std::this_thread::sleep_for(6s);
+  EXPECT_TRUE(list.running()) << list.err();
+  stage.start_server({"--plain", "--listen", address});
+  EXPECT_EQ(list.wait(60s), 0) << list.err();
+  EXPECT_NE(list.out().find("open, at event 0"), std::string::npos) << list.out();
 }
 
 TEST(Trouble, AViewerWithoutADisplaySaysHowToGetOne) {
