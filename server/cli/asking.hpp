@@ -11,9 +11,9 @@ class App;
 
 namespace osteon {
 
-// Adds the command `name` to `parent`, with --server and the options for credentials. If it is on the command line,
-// `chosen` becomes a function that connects to the server and calls `run`; its errors are those of both. Returns the
-// command, so that the caller can add options.
+// Adds the command `name` to `parent`, with --server, --timeout and the options for credentials. If it is on the
+// command line, `chosen` becomes a function that connects to the server within --timeout and calls `run`; its errors
+// are those of both. Returns the command, so that the caller can add options.
 CLI::App* add_asking_command(CLI::App& parent, const char* name, const char* what,
                              std::function<Result<void>()>& chosen, std::function<Result<void>(RoomAdminClient&)> run);
 

@@ -78,7 +78,10 @@ class AuthenticatedPrograms : public ::testing::Test {
 
 TEST_F(AuthenticatedPrograms, AdmitWhoMayEnterAndKeepOthersFromDisturbingThem) {
   Process sue = haptic("sue", "sue", "trainee", {{"steps", {drill_at(0, 0, "rig")}}});
-  Process dora = haptic("dora", "dora", "collaborator", {{"steps", {drill_at(9, 9, "rig")}}});
+  // She drills until she is stopped. At this feed the hole takes eleven minutes.
+  nlohmann::json slowly = drill_at(9, 9, "rig");
+  slowly["feed_mm_per_s"] = 0.05;
+  Process dora = haptic("dora", "dora", "collaborator", {{"steps", {slowly}}});
   Process ben = stage_.start("osteon-audio", plus({"--server", stage_.address(), "--output", "none"},
                                                   credentials("ben", ticket("ben", "observer"))));
 

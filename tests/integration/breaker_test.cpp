@@ -1,4 +1,6 @@
-// Runs the breaker for half a minute. deploy/test --soak runs it longer, with other seeds.
+// Runs the breaker for a minute and a half. deploy/test --soak runs it longer, with other seeds. It computes and hardly
+// waits: half of the time goes into starts of programs. The first test has 168 of them, at 0.14 s each, most of which
+// is linking of OpenVDB's 69 000 relocations, all of them at the start.
 #include "tests/integration/breaker.hpp"
 
 #include <gtest/gtest.h>
