@@ -21,11 +21,21 @@ namespace {
 using nlohmann::json;
 
 constexpr int kVersion = 1;
-constexpr std::size_t kMostBytes = 4096, kMostText = 512;
+// Two texts of control characters, of six bytes each in JSON, and all numbers fit into a message.
+constexpr std::size_t kMostBytes = 8192, kMostText = 512;
 constexpr double kFarthest_mm = 1e5, kMostRpm = 2e5, kMostForce_n = 1e6;
 
 json numbers(const Vec3& v) { return json::array({v.x(), v.y(), v.z()}); }
 json numbers(const Eigen::Quaterniond& q) { return json::array({q.w(), q.x(), q.y(), q.z()}); }
+
+// The part of a text that a reader takes. A message with a longer one would be refused as a whole.
+std::string shortened(const std::string& text) {
+  if (text.size() <= kMostText) return text;
+  std::size_t end = kMostText;
+  const auto within_character = [&] { return (static_cast<unsigned char>(text[end]) & 0xc0U) == 0x80U; };
+  while (end > 0 && within_character()) --end;
+  return text.substr(0, end);
+}
 
 // Reads the fields of one message. The first one that is wrong is the error.
 class Fields {
@@ -155,7 +165,8 @@ void send_text(Handle& to, const std::string& text) {
 // Takes all that waits; `take` gets each message.
 template <class Take>
 void receive_all(Handle& from, Take take) {
-  std::array<char, kMostBytes> buffer;
+  // One byte more, so that the part of a longer message is not taken for a whole one.
+  std::array<char, kMostBytes + 1> buffer;
   while (from) {
     const ssize_t size = ::recv(from.get(), buffer.data(), buffer.size(), MSG_DONTWAIT);
     if (size > 0) {
@@ -180,7 +191,7 @@ std::string encode(const PointerInput& input) {
               {"fine", input.fine},
               {"spindle", input.spindle},
               {"spindle_rpm", input.spindle_rpm},
-              {"tool", input.tool}}
+              {"tool", shortened(input.tool)}}
       .dump(-1, ' ', false, json::error_handler_t::replace);
 }
 
@@ -194,8 +205,8 @@ std::string encode(const PointerOutput& output) {
               {"depth_mm", output.depth_mm},
               {"pushing", output.pushing},
               {"on_metal", output.on_metal},
-              {"tool", output.tool},
-              {"trouble", output.trouble}}
+              {"tool", shortened(output.tool)},
+              {"trouble", shortened(output.trouble)}}
       .dump(-1, ' ', false, json::error_handler_t::replace);
 }
 

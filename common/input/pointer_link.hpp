@@ -41,8 +41,8 @@ struct PointerOutput {
   std::string trouble{};  // one sentence, such as why a tool cannot be held; empty: none
 };
 
-// As text, and back. Errors of reading, invalid_input: another version; a field that is missing, of another type, not
-// finite, out of its range, or too long.
+// As text, and back. A text of more than 512 bytes is shortened. Errors of reading, invalid_input: another version; a
+// field that is missing, of another type, not finite, out of its range, or too long.
 [[nodiscard]] std::string encode(const PointerInput& input);
 [[nodiscard]] std::string encode(const PointerOutput& output);
 [[nodiscard]] Result<PointerInput> read_pointer_input(std::string_view text);

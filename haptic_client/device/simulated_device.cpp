@@ -47,6 +47,12 @@ void SimulatedDevice::push_with(double push_n) noexcept {
   hand_.set_params(hand);
 }
 
+void SimulatedDevice::hold_across(double n_per_mm) noexcept {
+  HandParams hand = hand_.params();
+  hand.lateral_n_per_mm = n_per_mm;
+  hand_.set_params(hand);
+}
+
 void SimulatedDevice::step(double dt_s) noexcept { hand_.step(command_, force_n_, dt_s); }
 
 }  // namespace osteon::haptic

@@ -32,6 +32,8 @@ class SimulatedDevice final : public HapticDevice {
   void take(const HandParams& hand, const Vec3& at_mm) noexcept;
   // [haptic] The push of the hand, newtons on the device.
   void push_with(double push_n) noexcept;
+  // [haptic] Stiffness of the hand across its axis, on the device.
+  void hold_across(double n_per_mm) noexcept;
   // [haptic] Advances the time.
   void step(double dt_s) noexcept;
   [[nodiscard]] const Hand& hand() const noexcept { return hand_; }

@@ -143,7 +143,7 @@ LoopReport HapticLoop::tick(const LoopInput& input, const Patch& patch, std::spa
     paid_n_per_mm = ledger_.paid_n_per_mm(at_handle * coupling_n_per_mm_, stretch_mm) / at_handle;
     if (limit_n < device_n) paid_n_per_mm = std::min(paid_n_per_mm, limit_n / stretch_mm);
     step = proxy_.step(model, patch, pose_bone_wanted, spindle_.rpm, paid_n_per_mm,
-                       works && !input.clutch && !cuts_waiting, params_.dt_s,
+                       works && input.may_cut && !input.clutch && !cuts_waiting, params_.dt_s,
                        {guides, guiding_.held() ? guiding_.guide_id() : 0u,
                         params_.tool_effects ? &effects_[static_cast<std::size_t>(tool_)] : nullptr});
   }

@@ -60,7 +60,8 @@ struct LoopInput {
   bool device_ok = true;     // connected, working and calibrated; false: no force
   bool device_warm = false;  // show no more than the continuous force
   RoomLink room = RoomLink::follows;
-  int periods = 1;  // since the last tick; 1 when on time
+  int periods = 1;      // since the last tick; 1 when on time
+  bool may_cut = true;  // false: the tool only blocks, even while its spindle turns
 };
 
 // Bits of LoopReport::events.

@@ -9,7 +9,10 @@ namespace {
 
 // The tip rests this far above the surface, so that a turning tool cuts nothing before the hand pushes.
 constexpr double kRest_mm = 0.3;
-constexpr double kAway_mm = 12.0;  // the tool's height above the bone while the pointer is elsewhere
+// A tool that is closer to the bone goes out along its axis before it goes sideways.
+constexpr double kClear_mm = 0.1;
+constexpr double kHighest_mm = 60.0;  // the tip rests at most so high, as over a deep hole
+constexpr double kAway_mm = 12.0;     // the tool's height above the bone while the pointer is elsewhere
 // A pointer that goes farther than this at once has jumped. The hand then takes the tool off the bone and puts it down
 // again at the new place. It never drags the tool through bone.
 constexpr double kJump_mm = 6.0, kJump_rad = 0.8;
@@ -19,7 +22,6 @@ constexpr double kTurn_rad_per_s = 3.0;
 constexpr double kFine = 0.1;
 constexpr double kReact_s = 0.6;  // as of the simulated surgeon
 constexpr double kStuck_s = 3.0;
-constexpr double kSunk_mm = 0.5;  // a tool deeper than this comes back before it goes elsewhere
 
 LoopParams pointer_params(const DeviceLimits& limits, double force_scale, double dt_s) {
   LoopParams params = loop_params(limits, force_scale);
@@ -62,7 +64,9 @@ PointerSession::PointerSession(ReadyPlan plan, PointerExchange& exchange, const 
     : plan_(std::move(plan)),
       exchange_(exchange),
       device_(device),
-      loop_(pointer_params(device.limits, force_scale, dt_s), plan_.tools) {}
+      loop_(pointer_params(device.limits, force_scale, dt_s), plan_.tools) {
+  near_.make_room(kMostContactPoints);
+}
 
 void PointerSession::enter(PointerPhase phase) noexcept {
   phase_ = phase;
@@ -89,9 +93,12 @@ void PointerSession::take_up(SurgeonOrder& order) noexcept {
   WorkspaceMapping mapping;
   mapping.align(Eigen::Quaterniond::Identity(), std::min(1.0, stiff_enough), tip_mm, tip_mm);
   const Pose pose{tip_mm, rotation_};
-  loop_.take_up(command_.tool, pose, mapping);
-  device_.take(scaled(expert_hand(), loop_.params().force_scale, mapping.scale()),
-               mapping.pose_device_tool(pose).position_mm);
+  held_ = command_.tool;
+  height_mm_ = kAway_mm;
+  loop_.take_up(held_, pose, mapping);
+  const HandParams hand = scaled(expert_hand(), loop_.params().force_scale, mapping.scale());
+  across_n_per_mm_ = hand.lateral_n_per_mm;
+  device_.take(hand, mapping.pose_device_tool(pose).position_mm);
   hand_ = {HandMode::carry, tip_mm, axis()};
   order.take_up = taken_up_ = true;
 }
@@ -102,6 +109,35 @@ bool PointerSession::carry(const Vec3& to_mm, double speed_mm_per_s, double dt_s
   hand_.target_mm += limited(way, speed_mm_per_s * dt_s);
   hand_.axis = axis();
   return way.norm() <= speed_mm_per_s * dt_s;
+}
+
+std::optional<double> PointerSession::clear_mm(const Patch& patch) noexcept {
+  if (patch.version == 0) return std::nullopt;
+  const ToolModel& model = loop_.tool(held_);
+  ContactQuery query;
+  query.pose_bone_tool = {hand_.target_mm, rotation_};
+  query.groups = model.contact.groups();
+  query.lift_mm = model.inset;
+  evaluate_contact(patch, model.contact, query, near_);
+  if (!near_.covered) return std::nullopt;
+  return *std::min_element(near_.nearest_mm.begin(), near_.nearest_mm.begin() + query.groups);
+}
+
+bool PointerSession::come_to_rest(const Patch& patch, double speed_mm_per_s, double dt_s) noexcept {
+  const std::optional<double> clear = clear_mm(patch);
+  if (!clear) return false;
+  // A distance changes by no more than the way, so a tool that goes down by what it has left does not touch. A tilted
+  // tool gets there in some ticks.
+  const double down_mm = std::clamp(*clear - kRest_mm, -kOverSpeed_mm_per_s * dt_s, kDownSpeed_mm_per_s * dt_s);
+  if (*clear < kClear_mm) {
+    height_mm_ = (command_.target_mm - hand_.target_mm).dot(axis());
+    if (height_mm_ < kHighest_mm) carry(hand_.target_mm + down_mm * axis(), kOverSpeed_mm_per_s, dt_s);
+    return false;
+  }
+  height_mm_ = std::clamp(height_mm_ - down_mm, kRest_mm, kHighest_mm);
+  constexpr double kSettled_mm = 0.02;
+  const bool there = carry(lifted(height_mm_), speed_mm_per_s, dt_s);
+  return there && (height_mm_ == kRest_mm || down_mm < kSettled_mm);
 }
 
 void PointerSession::begin_push() noexcept {
@@ -130,7 +166,7 @@ bool PointerSession::gave_way() noexcept {
   return met_ && last_.cutting.engaged < kOut && resists_n < 0.5 * command_.push_n;
 }
 
-void PointerSession::act(double dt_s, SurgeonOrder& order) noexcept {
+void PointerSession::act(const Patch& patch, double dt_s, SurgeonOrder& order) noexcept {
   const bool there = command_.on_bone && !silent();
   if (!taken_up_) {
     if (there) take_up(order), enter(PointerPhase::over);
@@ -138,17 +174,18 @@ void PointerSession::act(double dt_s, SurgeonOrder& order) noexcept {
   }
   const bool held = there && command_.push && let_go_;
   const Vec3 tip_mm = last_.pose_bone_proxy.position_mm;
-  const bool other_tool = command_.tool != last_.tool;
+  const bool other_tool = command_.tool != held_;
   switch (phase_) {
     case PointerPhase::away:
     case PointerPhase::over:
     case PointerPhase::rests: {
       if (!there) {
-        carry(lifted(kAway_mm), kOverSpeed_mm_per_s, dt_s);
+        height_mm_ = kAway_mm;
+        carry(lifted(height_mm_), kOverSpeed_mm_per_s, dt_s);
         enter(PointerPhase::away);
         break;
       }
-      const double jump_mm = (lifted(kRest_mm) - hand_.target_mm).norm();
+      const double jump_mm = (lifted(height_mm_) - hand_.target_mm).norm();
       if (other_tool || rotation_.angularDistance(command_.rotation) > kJump_rad ||
           (jump_mm > kJump_mm && phase_ == PointerPhase::rests) || jump_mm > 2.0 * kAway_mm) {
         take_up(order);
@@ -157,7 +194,7 @@ void PointerSession::act(double dt_s, SurgeonOrder& order) noexcept {
       }
       rotation_ = turned_toward(rotation_, command_.rotation, kTurn_rad_per_s * dt_s);
       const double speed = phase_ == PointerPhase::rests ? kOverSpeed_mm_per_s : kDownSpeed_mm_per_s;
-      const bool down = carry(lifted(kRest_mm), speed, dt_s);
+      const bool down = come_to_rest(patch, speed, dt_s);
       enter(down || phase_ == PointerPhase::rests ? PointerPhase::rests : PointerPhase::over);
       if (held && phase_ == PointerPhase::rests) begin_push();
       break;
@@ -184,7 +221,10 @@ void PointerSession::act(double dt_s, SurgeonOrder& order) noexcept {
       react_s_ += dt_s;
       // A tool that is stuck is let go, and taken up again off the bone.
       if (react_s_ > kStuck_s) taken_up_ = false, enter(PointerPhase::away);
-      if (out && (tip_mm - pushed_from_mm_).dot(hand_.axis) < kSunk_mm) enter(PointerPhase::rests);
+      if (out && (tip_mm - pushed_from_mm_).dot(hand_.axis) < -kClear_mm) {
+        height_mm_ = kRest_mm;
+        enter(PointerPhase::rests);
+      }
       break;
     }
   }
@@ -195,17 +235,20 @@ SessionTick PointerSession::tick(const Patch& patch, RoomLink room, int periods,
   const double dt_s = loop_.params().dt_s;
   SessionTick result;
   read_pointer();
-  act(dt_s, result.order);
-  const bool works = phase_ == PointerPhase::pushes || phase_ == PointerPhase::reacts ||
-                     phase_ == PointerPhase::withdraws || phase_ == PointerPhase::rests;
-  const double own_rpm = plan_.tools[static_cast<std::size_t>(command_.tool)].tool.spindle_rpm;
-  const double full_rpm = command_.spindle_rpm > 0.0 ? command_.spindle_rpm : own_rpm;
+  act(patch, dt_s, result.order);
+  const bool works = phase_ >= PointerPhase::rests;
+  // The speed that the pointer wants is of the tool that it wants.
+  const double own_rpm = plan_.tools[static_cast<std::size_t>(held_)].tool.spindle_rpm;
+  const double full_rpm = command_.tool == held_ && command_.spindle_rpm > 0.0 ? command_.spindle_rpm : own_rpm;
   const double rpm = works && !silent() ? command_.spindle * full_rpm : 0.0;
   if (taken_up_) {
     const WorkspaceMapping& mapping = loop_.mapping();
     HandCommand command = hand_;
     command.target_mm = mapping.pose_device_tool({hand_.target_mm, rotation_}).position_mm;
     device_.push_with(command_.push_n * loop_.params().force_scale);
+    // A hand that is stiffer across the axis than along it leaves the straight way, so a tilted tool would dip.
+    const HandParams& hand = device_.hand().params();
+    device_.hold_across(phase_ < PointerPhase::pushes ? hand.stiffness_n_per_mm : across_n_per_mm_);
     device_.command(command, rotation_, rpm > 0.0 ? kSpindlePedal : 0u);
     device_.step(dt_s);
   }
@@ -217,6 +260,8 @@ SessionTick PointerSession::tick(const Patch& patch, RoomLink room, int periods,
   input.device_ok = taken_up_;
   input.room = room;
   input.periods = periods;
+  // Only a hand that pushes, or draws the tool out, cuts. A tool that is moved fast over the bone may touch it.
+  input.may_cut = phase_ >= PointerPhase::pushes;
   const std::span<const PlacedGuide> guides =
       room_guides ? std::span<const PlacedGuide>(*room_guides) : std::span<const PlacedGuide>();
   result.order.phase = taken_up_ ? SurgeonPhase::free_hand : SurgeonPhase::wait;

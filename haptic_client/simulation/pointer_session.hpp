@@ -75,8 +75,13 @@ class PointerSession final : public Session {
  private:
   [[nodiscard]] bool silent() const noexcept { return ticks_since_message_ > kSilentTicks; }
   void read_pointer() noexcept;
-  void act(double dt_s, SurgeonOrder& order) noexcept;
+  void act(const Patch& patch, double dt_s, SurgeonOrder& order) noexcept;
   void take_up(SurgeonOrder& order) noexcept;  // above the pointer's target
+  // Brings the tip to its rest above the pointer's target, or as close to it as the tool stays clear of the bone. True:
+  // it is there.
+  bool come_to_rest(const Patch& patch, double speed_mm_per_s, double dt_s) noexcept;
+  // Distance of the tool from the bone, if its tip were where the hand wants it. None: the patch does not reach there.
+  [[nodiscard]] std::optional<double> clear_mm(const Patch& patch) noexcept;
   void begin_push() noexcept;
   void follow_across() noexcept;
   // The tip goes along a line to a point, at most this fast. True: it is there.
@@ -94,6 +99,10 @@ class PointerSession final : public Session {
   PointerCommand command_;
   HandCommand hand_;
   Eigen::Quaterniond rotation_ = Eigen::Quaterniond::Identity();  // of the tool in the hand
+  int held_ = 0;                                                  // tool in the hand
+  double height_mm_ = 0;        // of the tip above the pointer's target, while the hand does not push
+  double across_n_per_mm_ = 0;  // stiffness of the hand across the axis, on the device
+  ContactValues near_;
   PointerPhase phase_ = PointerPhase::away;
   bool taken_up_ = false;
   int ticks_since_message_ = kSilentTicks + 1;

@@ -18,6 +18,7 @@
 #include "tests/fuzz/datagram_target.hpp"
 #include "tests/fuzz/import_targets.hpp"
 #include "tests/fuzz/journal_target.hpp"
+#include "tests/fuzz/pointer_target.hpp"
 #include "tests/fuzz/requests_target.hpp"
 #include "tests/fuzz/samples.hpp"
 #include "tests/fuzz/ticket_target.hpp"
@@ -254,7 +255,8 @@ std::vector<Target> targets() {
       grey_slice_target(),
       label_names_target(),
       label_header_target(),
-      dicom_segments_target()};
+      dicom_segments_target(),
+      pointer_message_target()};
 }
 
 }  // namespace osteon::fuzz

@@ -8,6 +8,8 @@ FORCE = "haptic_client/contact/cutting_force.cpp"
 LEDGER = "haptic_client/rendering/energy_ledger.cpp"
 PIXELS = "server/import/dicom_pixels.cpp"
 APPLY = "server/room/room_apply.cpp"
+LINK = "common/input/pointer_link.cpp"
+POINTED = "haptic_client/simulation/pointer_session.cpp"
 
 MUTATIONS = [
     # Faults that no test, or only luck, noticed once.
@@ -269,4 +271,20 @@ MUTATIONS = [
     M("common/imaging/hu_volume.cpp", "if (!keep_going(static_cast<double>(slice - first[2]) / part.dims[2]))",
       "if (false)",
       "cropping a scan cannot be stopped", "unit.imaging", "HuVolume.Cropping*"),
+    M(POINTED, "return met_ && last_.cutting.engaged < kOut", "return last_.cutting.engaged > 2.0",
+      "a pointed hand never notices a breakthrough", "unit.pointed_hand", "PointedHand.LetsGo*"),
+    M(POINTED, "      if (!there || !command_.push) {\n        enter(PointerPhase::withdraws);",
+      "      if (!there || !command_.push) {\n        enter(PointerPhase::rests);",
+      "a pointed tool goes sideways out of the bone", "unit.pointed_hand", "PointedHand.ComesOutBefore*"),
+    M(POINTED, "command_.tool == held_ && command_.spindle_rpm > 0.0", "command_.spindle_rpm > 0.0",
+      "a tool in the bone turns at the speed of the tool that comes next", "unit.pointed_hand",
+      "PointedHand.AnotherTool*"),
+    M(POINTED, "input.may_cut = phase_ >= PointerPhase::pushes;", "input.may_cut = true;",
+      "a turning tool that rests cuts while it is moved", "unit.pointed_hand", "PointedHand.ATilted*"),
+    M(LINK, "if (!(value >= least && value <= most)) return wrong(name), least;", "",
+      "a pointer's numbers have no range", "unit.input", "PointerMessage.*"),
+    M(LINK, "if (same_user(waiting.get())) peer = std::move(waiting);", "peer = std::move(waiting);",
+      "a window talks to another user", "unit.input", "PointerLink.AnotherUser*"),
+    M(LINK, "std::array<char, kMostBytes + 1> buffer;", "std::array<char, kMostBytes> buffer;",
+      "the beginning of a longer message counts as a message", "unit.input", "PointerLink.*"),
 ]

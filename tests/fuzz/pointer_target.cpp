@@ -1,0 +1,73 @@
+#include "tests/fuzz/pointer_target.hpp"
+
+#include <string_view>
+
+#include "common/core/check.hpp"
+#include "common/input/pointer_link.hpp"
+#include "tests/fuzz/import_files.hpp"
+
+namespace osteon::fuzz {
+namespace {
+
+bool within(double value, double least, double most) { return value >= least && value <= most; }
+
+bool is_near(const Vec3& v, double most) { return v.cwiseAbs().maxCoeff() <= most; }
+
+bool is_unit(const Eigen::Quaterniond& q) { return within(q.norm(), 1.0 - 1e-12, 1.0 + 1e-12); }
+
+// What a tool is moved by lies within its ranges, and comes back the same when it is sent on.
+void check_input(const PointerInput& input) {
+  OSTEON_CHECK(is_near(input.target_mm, 1e5) && is_unit(input.rotation_bone_tool));
+  OSTEON_CHECK(within(input.push_n, kLeastPush_n, kMostPush_n) && within(input.spindle, 0.0, 1.0));
+  OSTEON_CHECK(within(input.spindle_rpm, 0.0, 2e5) && input.tool.size() <= 512);
+  Result<PointerInput> again = read_pointer_input(encode(input));
+  OSTEON_CHECK(again && again->rotation_bone_tool.isApprox(input.rotation_bone_tool, 1e-12));
+  again->rotation_bone_tool = input.rotation_bone_tool;
+  OSTEON_CHECK(*again == input);
+}
+
+void check_output(const PointerOutput& output) {
+  OSTEON_CHECK(is_near(output.pose_bone_tool.position_mm, 1e5) && is_unit(output.pose_bone_tool.rotation));
+  OSTEON_CHECK(is_near(output.force_hand_n, 1e6) && is_near(output.force_bone_n, 1e6));
+  OSTEON_CHECK(output.tool.size() <= 512 && output.trouble.size() <= 512);
+  const Result<PointerOutput> again = read_pointer_output(encode(output));
+  OSTEON_CHECK(again && again->trouble == output.trouble && again->tool == output.tool);
+  OSTEON_CHECK(again->pose_bone_tool.position_mm == output.pose_bone_tool.position_mm);
+  OSTEON_CHECK(again->depth_mm == output.depth_mm && again->push_n == output.push_n);
+  OSTEON_CHECK(again->pushing == output.pushing && again->on_metal == output.on_metal);
+}
+
+void read_message(std::span<const std::uint8_t> data) {
+  const std::string_view text(reinterpret_cast<const char*>(data.data()), data.size());
+  if (const Result<PointerInput> input = read_pointer_input(text))
+    check_input(*input);
+  else
+    expect_bounded(input.error());
+  if (const Result<PointerOutput> output = read_pointer_output(text))
+    check_output(*output);
+  else
+    expect_bounded(output.error());
+}
+
+}  // namespace
+
+Target pointer_message_target() {
+  PointerInput input;
+  input.target_mm = {1.25, -20.5, 300.0};
+  input.on_bone = input.push = true;
+  input.tool = "drill-3.2";
+  PointerOutput output;
+  output.force_bone_n = {0.0, 1.5, -27.25};
+  output.pushing = true;
+  output.tool = "burr-round-5";
+  output.trouble = "the tool \"gr\u00f6\u00dfer\" cannot be held";
+  Target target{"pointer_message",
+                read_message,
+                {bytes_of_text(encode(PointerInput{})), bytes_of_text(encode(input)),
+                 bytes_of_text(encode(PointerOutput{})), bytes_of_text(encode(output))}};
+  // Half of the changed inputs keep the form of JSON, so that fields are reached.
+  target.change = change_number;
+  return target;
+}
+
+}  // namespace osteon::fuzz

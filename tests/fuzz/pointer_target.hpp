@@ -1,0 +1,9 @@
+// Fuzz target for the messages between a window and its haptic client.
+#pragma once
+#include "tests/fuzz/targets.hpp"
+
+namespace osteon::fuzz {
+
+[[nodiscard]] Target pointer_message_target();  // of either end
+
+}  // namespace osteon::fuzz
