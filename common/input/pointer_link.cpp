@@ -126,17 +126,19 @@ Error trouble(const std::filesystem::path& socket, const char* what) {
   return {ErrorCode::internal, "the pointer's socket " + socket.string() + " " + what + ": " + std::strerror(errno)};
 }
 
-// A descriptor that closes itself.
-class Handle {
+}  // namespace
+
+// A descriptor that closes itself. The classes of the header have some, so its name is not of this file alone.
+class PointerSocket {
  public:
-  Handle() = default;
-  explicit Handle(int fd) : fd_(fd) {}
-  Handle(Handle&& other) noexcept : fd_(std::exchange(other.fd_, -1)) {}
-  Handle& operator=(Handle&& other) noexcept {
+  PointerSocket() = default;
+  explicit PointerSocket(int fd) : fd_(fd) {}
+  PointerSocket(PointerSocket&& other) noexcept : fd_(std::exchange(other.fd_, -1)) {}
+  PointerSocket& operator=(PointerSocket&& other) noexcept {
     std::swap(fd_, other.fd_);
     return *this;
   }
-  ~Handle() { close(); }
+  ~PointerSocket() { close(); }
   void close() {
     if (fd_ >= 0) ::close(fd_);
     fd_ = -1;
@@ -148,13 +150,15 @@ class Handle {
   int fd_ = -1;
 };
 
+namespace {
+
 bool same_user(int fd) {
   ucred peer{};
   socklen_t size = sizeof peer;
   return ::getsockopt(fd, SOL_SOCKET, SO_PEERCRED, &peer, &size) == 0 && peer.uid == ::geteuid();
 }
 
-void send_text(Handle& to, const std::string& text) {
+void send_text(PointerSocket& to, const std::string& text) {
   if (!to) return;
   // A full buffer drops the message: a newer one follows. Anything else is the end of the connection.
   if (::send(to.get(), text.data(), text.size(), MSG_DONTWAIT | MSG_NOSIGNAL) < 0 && errno != EAGAIN &&
@@ -164,7 +168,7 @@ void send_text(Handle& to, const std::string& text) {
 
 // Takes all that waits; `take` gets each message.
 template <class Take>
-void receive_all(Handle& from, Take take) {
+void receive_all(PointerSocket& from, Take take) {
   // One byte more, so that the part of a longer message is not taken for a whole one.
   std::array<char, kMostBytes + 1> buffer;
   while (from) {
@@ -249,14 +253,14 @@ Result<PointerOutput> read_pointer_output(std::string_view text) {
 
 struct PointerServer::Impl {
   std::filesystem::path path;
-  Handle listening, peer;
+  PointerSocket listening, peer;
   std::optional<PointerOutput> newest;
   std::uint64_t refused = 0;
 
   // Takes a client that waits, if there is none, and all that it said.
   void attend() {
     while (!peer) {
-      Handle waiting(::accept4(listening.get(), nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK));
+      PointerSocket waiting(::accept4(listening.get(), nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK));
       if (!waiting) break;
       if (same_user(waiting.get())) peer = std::move(waiting);
     }
@@ -284,7 +288,7 @@ Result<std::unique_ptr<PointerServer>> PointerServer::listen(const std::filesyst
                                           " already; end it, or choose another path");
   auto impl = std::make_unique<Impl>();
   impl->path = socket;
-  impl->listening = Handle(::socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
+  impl->listening = PointerSocket(::socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
   if (!impl->listening) return tl::unexpected(trouble(socket, "cannot be made"));
   std::error_code ignored;
   if (std::filesystem::is_socket(socket, ignored)) ::unlink(socket.c_str());
@@ -314,7 +318,7 @@ bool PointerServer::connected() {
 std::uint64_t PointerServer::refused() const { return impl_->refused; }
 
 struct PointerClient::Impl {
-  Handle peer;
+  PointerSocket peer;
   std::uint64_t refused = 0;
 };
 
@@ -326,7 +330,7 @@ Result<std::unique_ptr<PointerClient>> PointerClient::connect(const std::filesys
   const Result<sockaddr_un> address = address_of(socket);
   if (!address) return tl::unexpected(address.error());
   auto impl = std::make_unique<Impl>();
-  impl->peer = Handle(::socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
+  impl->peer = PointerSocket(::socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
   if (!impl->peer) return tl::unexpected(trouble(socket, "cannot be made"));
   if (::connect(impl->peer.get(), reinterpret_cast<const sockaddr*>(&*address), sizeof(sockaddr_un)) != 0) {
     // Others wait for this window already. So it lives, even if it is busy.

@@ -371,7 +371,7 @@ TEST(Trouble, AServerThatHangsIsNoticedByAllItsClients) { expect_all_notice(SIGS
 
 // Push and stiffness of the expert's hand, stiffness of the coupling, and the largest force of the motor relative to
 // the coupling's (simulated_hand.hpp, haptic_loop.hpp, motor_port.hpp).
-constexpr double kPush_n = 29.0, kHand_n_per_mm = 5.5, kCoupling_n_per_mm = 50.0, kMotorShare = 0.3;
+constexpr double kExpertPush_n = 29.0, kHand_n_per_mm = 5.5, kCoupling_n_per_mm = 50.0, kMotorShare = 0.3;
 constexpr double kThickness_mm = 30.0;  // of the bone
 // A loop that misses more than three ticks shows no force for one tick. From then on the force F may grow by 0.5 N/ms,
 // and by twice the coupling's stiffness times what the hand moves: F' = 0.5 N/ms + 100 N/mm x'. It is back at 29 N
@@ -443,13 +443,13 @@ TEST(Trouble, TenSecondsOfSilenceAreSatOut) {
   const LeadingHand hand = leading_hand(read_table(stage / "silent.csv"));
   EXPECT_LT(hand.growth_mm, 0.02) << hand.stalls << " stalls, " << haptic.err();
   EXPECT_LT(hand.slack_mm, 0.02 + kMostByStall_mm * hand.stalls) << hand.stalls << " stalls, " << haptic.err();
-  EXPECT_LT(hand.most_n, kPush_n / (1.0 - kMotorShare)) << hand.stalls << " stalls, " << haptic.err();
+  EXPECT_LT(hand.most_n, kExpertPush_n / (1.0 - kMotorShare)) << hand.stalls << " stalls, " << haptic.err();
   // In the silence the hand rests, and the coupling carries its push. After a stall the hand's own stiffness takes a
   // part of it for 0.3 s. There may be three stalls in that time.
   EXPECT_GT(hand.silent_ticks, 100);
   EXPECT_LT(hand.silent_most_mm - hand.silent_least_mm, 0.01) << hand.stalls << " stalls";
-  EXPECT_GT(hand.silent_least_n, kPush_n - 3.0 * kHand_n_per_mm * kMostByStall_mm) << hand.stalls << " stalls";
-  EXPECT_LT(hand.silent_most_n, 1.05 * kPush_n) << hand.stalls << " stalls";
+  EXPECT_GT(hand.silent_least_n, kExpertPush_n - 3.0 * kHand_n_per_mm * kMostByStall_mm) << hand.stalls << " stalls";
+  EXPECT_LT(hand.silent_most_n, 1.05 * kExpertPush_n) << hand.stalls << " stalls";
   EXPECT_EQ(stage.server().terminate(), 0);
   EXPECT_EQ(summary["field_hash"], read_json(stage / "server.json")["field_hash"]);
 }

@@ -6,6 +6,7 @@
 #include <QVTKOpenGLNativeWidget.h>
 #include <QApplication>
 #include <QComboBox>
+#include <QCursor>
 #include <QLabel>
 #include <QListWidget>
 #include <QMenu>
@@ -16,6 +17,7 @@
 #include <QTest>
 #include <QToolButton>
 #include <QWheelEvent>
+#include <QWindow>
 #include <chrono>
 #include <fstream>
 #include <memory>
@@ -58,7 +60,7 @@ std::vector<pid_t> children(const std::string& program) {
 // One screen, one application and one folder of the user's data for all tests.
 class Desk {
  public:
-  Desk() : screen_(Xvfb::start("1280x900")) {
+  Desk() : screen_(Xvfb::start("1600x1100")) {
     if (!screen_) return;
     ::setenv("DISPLAY", screen_->display().c_str(), 1);
     ::setenv("QT_QPA_PLATFORM", "xcb", 1);
@@ -73,6 +75,8 @@ class Desk {
     application_.emplace(count_, arguments_);
     QApplication::setApplicationName("osteon");
     QApplication::setOrganizationName("osteon");
+    // The screen's own pointer stays off the window. Otherwise the window also gets its events.
+    QCursor::setPos(1599, 1099);
   }
   [[nodiscard]] bool stands() const { return application_.has_value(); }
   // A block of bone, 40 mm wide: cortical layers of 5 mm above and below marrow.
@@ -105,9 +109,7 @@ class WindowTest : public testing::Test {
   void SetUp() override {
     ASSERT_TRUE(desk_->stands()) << "Xvfb, of Debian's package xvfb, did not start";
     window_ = std::make_unique<MainWindow>();
-    window_->show();
-    window_->activateWindow();
-    ASSERT_TRUE(QTest::qWaitForWindowExposed(window_.get()));
+    show();
     view_ = window_->findChild<BoneView*>("bone");
     ASSERT_NE(view_, nullptr);
   }
@@ -117,6 +119,14 @@ class WindowTest : public testing::Test {
     EXPECT_TRUE(children("osteon-haptic").empty());
   }
 
+  // Without a window manager nothing moves the window, and nothing but this takes the keyboard's focus.
+  void show() {
+    window_->setGeometry(0, 0, 1280, 900);
+    window_->show();
+    window_->activateWindow();
+    ASSERT_TRUE(QTest::qWaitForWindowActive(window_.get(), 30000));
+    ASSERT_FALSE(window_->geometry().contains(QCursor::pos()));
+  }
   template <class Condition>
   [[nodiscard]] bool until(Condition condition, std::chrono::milliseconds patience = kPatience) {
     const auto deadline = std::chrono::steady_clock::now() + patience;
@@ -164,10 +174,16 @@ class WindowTest : public testing::Test {
     QTest::mouseClick(button, Qt::LeftButton);
   }
   [[nodiscard]] QPoint middle() const { return {view_->width() / 2, view_->height() / 2}; }
+  // The mouse, in pixels of the view. QTest's moves of a widget go through the screen's pointer, which comes late and
+  // knows no pressed buttons. Its events of a window go the way that the platform's go.
+  [[nodiscard]] QWindow* frame() const { return window_->windowHandle(); }
+  [[nodiscard]] QPoint in_frame(const QPoint& at) const { return view_->mapTo(window_.get(), at); }
   void hover(const QPoint& at) {
-    QTest::mouseMove(view_, at + QPoint(1, 0));
-    QTest::mouseMove(view_, at);
+    QTest::mouseMove(frame(), in_frame(at + QPoint(1, 0)));
+    QTest::mouseMove(frame(), in_frame(at));
   }
+  void press(const QPoint& at) { QTest::mousePress(frame(), Qt::LeftButton, {}, in_frame(at)); }
+  void release(const QPoint& at) { QTest::mouseRelease(frame(), Qt::LeftButton, {}, in_frame(at)); }
   [[nodiscard]] bool cut() const {
     const SceneUpdater* updater = view_->updater();
     return updater != nullptr && updater->complete() && updater->surface().any_cut_face();
@@ -177,7 +193,7 @@ class WindowTest : public testing::Test {
     click_tool("drill");
     hover(middle());
     ASSERT_TRUE(until([&] { return view_->pointer().on_bone(); }));
-    QTest::mousePress(view_, Qt::LeftButton, {}, middle());
+    press(middle());
     EXPECT_TRUE(until([&] { return cut(); })) << problem();
   }
   void trigger(const char* action) {
@@ -196,7 +212,7 @@ std::unique_ptr<Desk> WindowTest::desk_;
 TEST_F(WindowTest, AMouseDrillsTheBoneAndUndoBringsItBack) {
   open();
   drill();
-  QTest::mouseRelease(view_, Qt::LeftButton, {}, middle());
+  release(middle());
   const auto state = [&] { return view_->updater()->states().front(); };
   ASSERT_FALSE(view_->updater()->states().empty());
   EXPECT_EQ(state().tool_name, "drill-3.2");
@@ -250,16 +266,17 @@ TEST_F(WindowTest, AClickPlacesAPin) {
   open();
   click_tool("pin");
   EXPECT_TRUE(view_->placing());
-  QTest::mouseClick(view_, Qt::LeftButton, {}, middle());
+  press(middle());
+  release(middle());
   EXPECT_TRUE(until([&] { return view_->updater()->items().size() == 1; })) << problem();
 }
 
 TEST_F(WindowTest, ADragWithoutAToolTurnsTheBone) {
   open();
   const CameraView before = view_->camera();
-  QTest::mousePress(view_, Qt::LeftButton, {}, middle());
-  QTest::mouseMove(view_, middle() + QPoint(60, 0));
-  QTest::mouseRelease(view_, Qt::LeftButton, {}, middle() + QPoint(60, 0));
+  press(middle());
+  QTest::mouseMove(frame(), in_frame(middle() + QPoint(60, 0)));
+  release(middle() + QPoint(60, 0));
   EXPECT_GT((view_->camera().eye_mm - before.eye_mm).norm(), 5.0);
   trigger("overview");
   EXPECT_FALSE(cut());
@@ -275,13 +292,13 @@ TEST_F(WindowTest, AKilledHapticClientComesBackAndCutsAgain) {
     return now.size() == 1 && now[0] != clients[0] && label("device") == "Pointer";
   })) << problem();
   drill();
-  QTest::mouseRelease(view_, Qt::LeftButton, {}, middle());
+  release(middle());
 }
 
 TEST_F(WindowTest, AKilledServerComesBackWithTheHole) {
   open();
   drill();
-  QTest::mouseRelease(view_, Qt::LeftButton, {}, middle());
+  release(middle());
   trigger("put_down");
   QTest::qWait(500);
   const auto servers = children("osteon-server");
@@ -302,7 +319,7 @@ TEST_F(WindowTest, ClosingInTheMiddleOfACutEndsAllAndKeepsTheCut) {
   EXPECT_TRUE(children("osteon-haptic").empty());
   // The start page of the next window offers the session, and it has the hole.
   window_ = std::make_unique<MainWindow>();
-  window_->show();
+  show();
   view_ = window_->findChild<BoneView*>("bone");
   const auto recent = recent_entries();
   ASSERT_FALSE(recent.empty());
