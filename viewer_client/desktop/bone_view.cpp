@@ -44,6 +44,9 @@ void BoneView::show_room(RenderQueue* queue, const Box& bounds) {
   makeCurrent();
   scene_.reset();
   scene_ = std::make_unique<BoneScene>(*renderWindow());
+  scene_->show_marker(marker_);
+  (void)scene_->set_stereo(stereo_);
+  clipping_.clear();
   bounds_ = bounds;
   if (queue != nullptr) updater_.emplace(*queue, *scene_);
   look_overview();
@@ -123,6 +126,25 @@ void BoneView::set_notice(const QString& notice) {
   redraw();
 }
 
+void BoneView::show_marker(bool on) {
+  marker_ = on;
+  scene_->show_marker(on);
+  redraw();
+}
+
+void BoneView::clip(const Clipping& visible) {
+  clipping_ = visible;
+  scene_->clip(visible);
+  redraw();
+}
+
+bool BoneView::set_stereo(StereoMode mode) {
+  const bool has = scene_->set_stereo(mode);
+  stereo_ = scene_->stereo();
+  redraw();
+  return has;
+}
+
 void BoneView::camera_moved() {
   redraw();
   if (events_.looked && width() > 0 && height() > 0) events_.looked(look_of(camera(), width(), height()));
@@ -134,7 +156,17 @@ void BoneView::pointer_moved() {
 
 void BoneView::point_at(const QPoint& at) {
   if (!updater_) return;
-  pointer_.move(ray_through(camera(), width(), height(), at.x(), at.y()), updater_->surface());
+  pointer_.move(sight(at), updater_->surface());
+  // What is not drawn is still there, but nobody points at what he does not see.
+  if (!is_drawn(clipping_, pointer_.input().target_mm)) pointer_.leave();
+}
+
+SightRay BoneView::sight(const QPoint& at) const {
+  if (stereo_ != StereoMode::side_by_side) return ray_through(camera(), width(), height(), at.x(), at.y());
+  const int half = std::max(1, width() / 2);
+  const bool right = at.x() >= half;
+  const CameraView eye = right ? right_eye(camera()) : left_eye(camera());
+  return ray_through(eye, half, height(), right ? at.x() - half : at.x(), at.y());
 }
 
 void BoneView::turn_camera(const QPoint& by, Qt::KeyboardModifiers keys) {
@@ -190,9 +222,9 @@ void BoneView::mouseReleaseEvent(QMouseEvent* event) {
     pointer_moved();
   }
   if (event->button() == Qt::LeftButton && placing_ && (event->pos() - pressed_).manhattanLength() <= kClick_px) {
-    const SightRay ray = ray_through(camera(), width(), height(), event->pos().x(), event->pos().y());
+    const SightRay ray = sight(event->pos());
     const auto hit = updater_ ? updater_->surface().first_hit(ray.from_mm, ray.direction) : std::nullopt;
-    if (hit && events_.clicked) events_.clicked(*hit);
+    if (hit && is_drawn(clipping_, hit->point_mm) && events_.clicked) events_.clicked(*hit);
   }
   if (event->buttons() == Qt::NoButton) camera_drag_ = false;
 }

@@ -54,6 +54,11 @@ class BoneView : public QVTKOpenGLNativeWidget {
   void look_from(const Vec3& side);
   void look_tool();
   void set_notice(const QString& notice);
+  // How the bone is drawn. It holds for the rooms that follow too.
+  void show_marker(bool on);
+  void clip(const Clipping& visible);
+  // False: the display does not have the mode, and stereo is off.
+  [[nodiscard]] bool set_stereo(StereoMode mode);
 
   [[nodiscard]] const SceneUpdater* updater() const { return updater_ ? &*updater_ : nullptr; }
   [[nodiscard]] BoneScene& scene() { return *scene_; }
@@ -76,6 +81,8 @@ class BoneView : public QVTKOpenGLNativeWidget {
  private:
   void draw();
   void point_at(const QPoint& at);
+  // The line of sight through a pixel of the picture, or of one of the two pictures side by side.
+  [[nodiscard]] SightRay sight(const QPoint& at) const;
   void turn_camera(const QPoint& by, Qt::KeyboardModifiers keys);
   void camera_moved();
   void pointer_moved();
@@ -90,6 +97,9 @@ class BoneView : public QVTKOpenGLNativeWidget {
   QPoint pressed_;  // where a button went down
   bool camera_drag_ = false;
   QString notice_;
+  bool marker_ = false;
+  Clipping clipping_;
+  StereoMode stereo_ = StereoMode::off;
   QTimer frame_timer_;
   std::chrono::steady_clock::time_point next_frame_{};
   bool drawing_ = false, surface_shown_ = false;

@@ -25,10 +25,12 @@
 
 #include "common/tools/tool.hpp"
 #include "viewer_client/desktop/bone_view.hpp"
+#include "viewer_client/desktop/clipping_panel.hpp"
 #include "viewer_client/desktop/gauges_panel.hpp"
 #include "viewer_client/desktop/properties_panel.hpp"
 #include "viewer_client/desktop/start_page.hpp"
 #include "viewer_client/desktop/tool_bar.hpp"
+#include "viewer_client/desktop/view_options.hpp"
 
 namespace osteon {
 
@@ -94,6 +96,8 @@ void MainWindow::make_panels() {
     addDockWidget(area, made);
     return made;
   };
+  clipping_ =
+      new ClippingPanel([this](const Clipping& visible) { view_->clip(visible); }, [this] { return view_->camera(); });
   gauges_ = new GaugesPanel;
   properties_ = new PropertiesPanel(
       [this](const PropertiesPanel::Chosen& chosen) {
@@ -104,6 +108,7 @@ void MainWindow::make_panels() {
       [this](const std::string& tool) { take_tool(tool); });
   dock(tr("Tool"), "tool_panel", properties_, Qt::RightDockWidgetArea);
   dock(tr("Gauges"), "gauges_panel", gauges_, Qt::RightDockWidgetArea);
+  dock(tr("Open the bone"), "clipping_panel", clipping_, Qt::RightDockWidgetArea)->hide();
 }
 
 QAction* MainWindow::add_action(QMenu* menu, const QString& words, const char* name, const QKeySequence& keys,
@@ -173,6 +178,11 @@ void MainWindow::make_view_menu() {
   add_action(
       view, tr("F&ull screen"), "full_screen", QKeySequence::FullScreen,
       [this] { isFullScreen() ? showNormal() : showFullScreen(); }, false);
+  view_options_ = new ViewOptions(
+      *view_, *view,
+      [this](QMenu* menu, const QString& words, const char* name, const QKeySequence& keys,
+             std::function<void()> call) { return add_action(menu, words, name, keys, std::move(call), true); },
+      [this](const QString& sentence) { say(sentence); }, this);
   view->addSeparator();
   for (QDockWidget* panel : findChildren<QDockWidget*>()) view->addAction(panel->toggleViewAction());
 }
@@ -393,6 +403,8 @@ void MainWindow::join(const RoomAddress& room) {
 
 void MainWindow::show_joined(const WatchedRoom& room) {
   view_->show_room(&room_->queue(), room.bounds);
+  clipping_->reset(room.bounds);
+  view_options_->show_bone(QString::fromStdString(room.case_title));
   view_->set_notice({});
   view_->arrived();
   pages_->setCurrentWidget(view_);

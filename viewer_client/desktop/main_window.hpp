@@ -24,10 +24,12 @@ class QStackedWidget;
 namespace osteon {
 
 class BoneView;
+class ClippingPanel;
 class GaugesPanel;
 class PropertiesPanel;
 class StartPage;
 class SurgeryToolBar;
+class ViewOptions;
 
 // A room on a server that others run.
 struct RoomAddress {
@@ -94,6 +96,8 @@ class MainWindow : public QMainWindow {
   SurgeryToolBar* tools_ = nullptr;
   GaugesPanel* gauges_ = nullptr;
   PropertiesPanel* properties_ = nullptr;
+  ClippingPanel* clipping_ = nullptr;
+  ViewOptions* view_options_ = nullptr;
   QLabel *position_ = nullptr, *device_ = nullptr, *connection_ = nullptr;
   std::vector<QAction*> room_actions_;
   QAction *sound_ = nullptr, *spindle_ = nullptr;

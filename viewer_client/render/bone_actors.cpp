@@ -3,6 +3,8 @@
 #include <vtkActor.h>
 #include <vtkCellPicker.h>
 #include <vtkNew.h>
+#include <vtkPlane.h>
+#include <vtkPlaneCollection.h>
 #include <vtkPointData.h>
 #include <vtkPolyData.h>
 #include <vtkPolyDataMapper.h>
@@ -56,9 +58,17 @@ vtkSmartPointer<vtkActor> bone_actor(vtkPolyData* data) {
 struct BoneActors::Impl {
   vtkRenderer& renderer;
   std::map<RegionKey, vtkSmartPointer<vtkActor>> regions;
+  vtkNew<vtkPlaneCollection> planes;
+
+  void clip(vtkActor& actor) const {
+    const bool open = planes->GetNumberOfItems() > 0;
+    actor.GetMapper()->SetClippingPlanes(open ? planes.GetPointer() : nullptr);
+    // The surface is not closed then.
+    actor.GetProperty()->SetBackfaceCulling(open ? 0 : 1);
+  }
 };
 
-BoneActors::BoneActors(vtkRenderer& renderer) : impl_(new Impl{renderer, {}}) {}
+BoneActors::BoneActors(vtkRenderer& renderer) : impl_(new Impl{renderer, {}, {}}) {}
 
 BoneActors::~BoneActors() = default;
 
@@ -76,8 +86,21 @@ bool BoneActors::show(const RegionKey& region, const Mesh& mesh) {
     static_cast<vtkPolyDataMapper*>(held->second->GetMapper())->SetInputData(data);
     return false;
   }
-  impl_->regions.emplace(region, bone_actor(data));
+  const auto actor = bone_actor(data);
+  impl_->clip(*actor);
+  impl_->regions.emplace(region, actor);
   return true;
+}
+
+void BoneActors::clip(const Clipping& visible) {
+  impl_->planes->RemoveAllItems();
+  for (const ClipPlane& side : visible) {
+    vtkNew<vtkPlane> plane;
+    plane->SetOrigin(side.point_mm.x(), side.point_mm.y(), side.point_mm.z());
+    plane->SetNormal(side.inward.x(), side.inward.y(), side.inward.z());
+    impl_->planes->AddItem(plane);
+  }
+  for (const auto& [key, actor] : impl_->regions) impl_->clip(*actor);
 }
 
 void BoneActors::add() {

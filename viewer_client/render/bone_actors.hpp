@@ -4,6 +4,7 @@
 #include <memory>
 #include <optional>
 
+#include "viewer_client/scene/clipping.hpp"
 #include "viewer_client/scene/surface_scene.hpp"
 
 class vtkRenderer;
@@ -19,6 +20,9 @@ class BoneActors {
   // The region's whole mesh, bone frame. An empty mesh removes the region from the picture. Returns true if the region
   // is new; it is then drawn after the next add().
   [[nodiscard]] bool show(const RegionKey& region, const Mesh& mesh);
+
+  // Draws only this part of each region, also of those that come later.
+  void clip(const Clipping& visible);
 
   // Adds the actors of all regions to the renderer, in the order of their keys.
   void add();

@@ -7,14 +7,15 @@
 #include <vtkRenderWindow.h>
 #include <vtkRenderer.h>
 
-#include <numbers>
 #include <utility>
 
 #include "viewer_client/render/bone_actors.hpp"
 #include "viewer_client/render/lighting.hpp"
+#include "viewer_client/render/orientation_marker.hpp"
 #include "viewer_client/render/people_overlay.hpp"
 #include "viewer_client/render/status_text.hpp"
 #include "viewer_client/render/tool_actors.hpp"
+#include "viewer_client/render/view_of_camera.hpp"
 
 namespace osteon {
 
@@ -25,6 +26,8 @@ struct BoneScene::Impl {
   ToolActors tools{*renderer};
   StatusText status{*renderer};
   std::optional<PeopleOverlay> people;
+  OrientationMarker marker{window};
+  Stereo stereo{window, *renderer};
 
   bool smooth = false;
   std::vector<std::string> said;
@@ -108,23 +111,17 @@ std::optional<Vec3> BoneScene::surface_at(int x_px, int y_px) const {
 
 std::optional<Vec3> BoneScene::normal_at(const Vec3& point_mm) const { return impl_->bone.normal_at(point_mm); }
 
-void BoneScene::look(const CameraView& view) {
-  vtkCamera* camera = impl_->renderer->GetActiveCamera();
-  camera->SetPosition(view.eye_mm.x(), view.eye_mm.y(), view.eye_mm.z());
-  camera->SetFocalPoint(view.target_mm.x(), view.target_mm.y(), view.target_mm.z());
-  camera->SetViewUp(view.up.x(), view.up.y(), view.up.z());
-  camera->SetViewAngle(view.view_angle_rad * 180.0 / std::numbers::pi);
-}
+void BoneScene::look(const CameraView& view) { set_view(*impl_->renderer->GetActiveCamera(), view); }
 
-CameraView BoneScene::camera() const {
-  vtkCamera* camera = impl_->renderer->GetActiveCamera();
-  CameraView view;
-  camera->GetPosition(view.eye_mm.data());
-  camera->GetFocalPoint(view.target_mm.data());
-  camera->GetViewUp(view.up.data());
-  view.view_angle_rad = camera->GetViewAngle() * std::numbers::pi / 180.0;
-  return view;
-}
+CameraView BoneScene::camera() const { return view_of(*impl_->renderer->GetActiveCamera()); }
+
+void BoneScene::show_marker(bool on) { impl_->marker.show(on); }
+
+void BoneScene::clip(const Clipping& visible) { impl_->bone.clip(visible); }
+
+bool BoneScene::set_stereo(StereoMode mode) { return impl_->stereo.set(mode); }
+
+StereoMode BoneScene::stereo() const { return impl_->stereo.mode(); }
 
 void BoneScene::set_smooth(bool smooth) {
   impl_->smooth = smooth;
@@ -135,9 +132,13 @@ void BoneScene::draw() {
   impl_->people->show_words(impl_->said, impl_->holding, impl_->hint);
   impl_->people->show_stroke(impl_->stroke_mm);
   impl_->people->place();
+  const CameraView view = camera();
+  impl_->marker.follow(view);
+  impl_->stereo.place(view);
   impl_->renderer->ResetCameraClippingRange();
   impl_->window.Render();
   impl_->window.WaitForCompletion();
+  look(view);
 }
 
 Result<void> BoneScene::save_png(const std::filesystem::path& file) {

@@ -15,7 +15,9 @@
 #include "common/tools/annotation.hpp"
 #include "common/tools/scene_item.hpp"
 #include "viewer_client/render/image.hpp"
+#include "viewer_client/render/stereo.hpp"
 #include "viewer_client/scene/camera_view.hpp"
+#include "viewer_client/scene/clipping.hpp"
 #include "viewer_client/scene/surface_scene.hpp"
 
 class vtkRenderWindow;
@@ -54,6 +56,14 @@ class BoneScene {
 
   void look(const CameraView& view);
   [[nodiscard]] CameraView camera() const;
+
+  // The cube that names the patient's sides. It is off at first.
+  void show_marker(bool on);
+  // Draws only this part of the bone. Where the bone is open, its inside is seen. Tools and items stay whole.
+  void clip(const Clipping& visible);
+  // False: this window does not have the mode, and stereo is off.
+  [[nodiscard]] bool set_stereo(StereoMode mode);
+  [[nodiscard]] StereoMode stereo() const;
 
   // Smooth edges in live pictures. Saved pictures always have them.
   void set_smooth(bool smooth);

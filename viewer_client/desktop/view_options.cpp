@@ -1,0 +1,112 @@
+#include "viewer_client/desktop/view_options.hpp"
+
+#include <QAction>
+#include <QActionGroup>
+#include <QMenu>
+#include <QSettings>
+#include <utility>
+
+#include "viewer_client/desktop/bone_view.hpp"
+
+namespace osteon {
+
+namespace {
+
+constexpr int kMostViews = 9;
+constexpr int kNumbers = 9;  // eye, target and up
+
+QVariantList numbers_of(const CameraView& view) {
+  QVariantList numbers;
+  for (const Vec3& v : {view.eye_mm, view.target_mm, view.up})
+    for (int axis = 0; axis < 3; ++axis) numbers << v[axis];
+  return numbers;
+}
+
+}  // namespace
+
+ViewOptions::ViewOptions(BoneView& view, QMenu& menu, const Add& add, Say say, QObject* parent)
+    : QObject(parent), view_(view), say_(std::move(say)) {
+  marker_ = add(&menu, tr("&Cube of the patient's sides"), "marker", QKeySequence("Ctrl+K"), [this] {
+    QSettings().setValue("view/marker", marker_->isChecked());
+    view_.show_marker(marker_->isChecked());
+  });
+  marker_->setCheckable(true);
+  marker_->setChecked(QSettings().value("view/marker", true).toBool());
+  view_.show_marker(marker_->isChecked());
+  add_stereo(*menu.addMenu(tr("&Stereo")), add);
+  QMenu& kept = *menu.addMenu(tr("&Kept views"));
+  add(&kept, tr("&Keep this view"), "keep_view", QKeySequence("Ctrl+B"), [this] { keep_view(); });
+  add(&kept, tr("&Forget the kept views"), "forget_views", {}, [this] { forget_views(); });
+  kept.addSeparator();
+  for (int number = 1; number <= kMostViews; ++number) {
+    const QByteArray name = "view_" + QByteArray::number(number);
+    kept_.push_back(add(&kept, tr("View &%1").arg(number), name.constData(),
+                        QKeySequence(QString("Alt+%1").arg(number)), [this, number] { look(number); }));
+  }
+  refresh();
+}
+
+void ViewOptions::add_stereo(QMenu& menu, const Add& add) {
+  auto* group = new QActionGroup(this);
+  const auto choice = [&](const QString& words, const char* name, const QKeySequence& keys, StereoMode mode) {
+    QAction* made = add(&menu, words, name, keys, [this, mode] { set_stereo(mode); });
+    made->setCheckable(true);
+    group->addAction(made);
+    stereo_.push_back(made);
+  };
+  choice(tr("&Off"), "stereo_off", QKeySequence("Ctrl+Alt+0"), StereoMode::off);
+  choice(tr("&Anaglyph, for red and cyan glasses"), "stereo_anaglyph", QKeySequence("Ctrl+Alt+1"),
+         StereoMode::anaglyph);
+  choice(tr("&Side by side"), "stereo_side_by_side", QKeySequence("Ctrl+Alt+2"), StereoMode::side_by_side);
+  choice(tr("&Quad buffer"), "stereo_quad_buffer", QKeySequence("Ctrl+Alt+3"), StereoMode::quad_buffer);
+  stereo_.front()->setChecked(true);
+}
+
+void ViewOptions::set_stereo(StereoMode mode) {
+  if (view_.set_stereo(mode)) return;
+  stereo_.front()->setChecked(true);
+  say_(tr("This display has no quad buffer, so stereo is off. Choose anaglyph or side by side."));
+}
+
+void ViewOptions::show_bone(const QString& title) {
+  title_ = title;
+  refresh();
+}
+
+QString ViewOptions::key() const {
+  // A slash would make a group of the settings.
+  return "views/" + QString(title_).replace('/', '-').replace('\\', '-');
+}
+
+void ViewOptions::keep_view() {
+  QSettings settings;
+  QVariantList views = settings.value(key()).toList();
+  if (views.size() >= kMostViews) return say_(tr("Nine views are kept already. Forget them first."));
+  views << QVariant(numbers_of(view_.camera()));
+  settings.setValue(key(), views);
+  refresh();
+  say_(tr("Kept as view %1.").arg(views.size()));
+}
+
+void ViewOptions::forget_views() {
+  QSettings().remove(key());
+  refresh();
+}
+
+void ViewOptions::look(int number) {
+  const QVariantList numbers = QSettings().value(key()).toList().value(number - 1).toList();
+  if (numbers.size() != kNumbers) return;
+  CameraView view = view_.camera();
+  int i = 0;
+  for (Vec3* v : {&view.eye_mm, &view.target_mm, &view.up})
+    for (int axis = 0; axis < 3; ++axis) (*v)[axis] = numbers[i++].toDouble();
+  const bool usable = (view.eye_mm - view.target_mm).cross(view.up).norm() > 0.0;
+  if (usable) view_.look(view);
+}
+
+void ViewOptions::refresh() {
+  const int count = QSettings().value(key()).toList().size();
+  for (int i = 0; i < kMostViews; ++i) kept_[static_cast<std::size_t>(i)]->setVisible(i < count);
+}
+
+}  // namespace osteon

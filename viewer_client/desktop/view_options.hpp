@@ -1,0 +1,51 @@
+// The part of the menu View that says how the bone is drawn: the cube of the patient's sides, stereo, and views that
+// the user keeps.
+#pragma once
+#include <QCoreApplication>
+#include <QKeySequence>
+#include <QObject>
+#include <functional>
+#include <vector>
+
+#include "viewer_client/render/stereo.hpp"
+
+class QAction;
+class QMenu;
+
+namespace osteon {
+
+class BoneView;
+
+// [GUI thread]
+class ViewOptions : public QObject {
+  Q_DECLARE_TR_FUNCTIONS(ViewOptions)
+
+ public:
+  // Adds an action to a menu: words, name, keys, what it does.
+  using Add = std::function<QAction*(QMenu*, const QString&, const char*, const QKeySequence&, std::function<void()>)>;
+  using Say = std::function<void(const QString&)>;
+
+  // `view` and the menu must outlive it.
+  ViewOptions(BoneView& view, QMenu& menu, const Add& add, Say say, QObject* parent);
+
+  // Kept views are of one bone.
+  void show_bone(const QString& title);
+
+ private:
+  void add_stereo(QMenu& menu, const Add& add);
+  void set_stereo(StereoMode mode);
+  void keep_view();
+  void forget_views();
+  void look(int number);
+  void refresh();
+  [[nodiscard]] QString key() const;
+
+  BoneView& view_;
+  Say say_;
+  QString title_;
+  QAction* marker_ = nullptr;
+  std::vector<QAction*> stereo_;  // by StereoMode
+  std::vector<QAction*> kept_;
+};
+
+}  // namespace osteon
