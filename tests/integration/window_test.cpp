@@ -5,11 +5,14 @@
 
 #include <QVTKOpenGLNativeWidget.h>
 #include <QApplication>
+#include <QCheckBox>
 #include <QComboBox>
 #include <QCursor>
 #include <QLabel>
 #include <QListWidget>
 #include <QMenu>
+#include <QPushButton>
+#include <QSlider>
 #include <QSpinBox>
 #include <QStackedWidget>
 #include <QStatusBar>
@@ -280,6 +283,58 @@ TEST_F(WindowTest, ADragWithoutAToolTurnsTheBone) {
   EXPECT_GT((view_->camera().eye_mm - before.eye_mm).norm(), 5.0);
   trigger("overview");
   EXPECT_FALSE(cut());
+}
+
+// A view is kept, left, and taken again.
+TEST_F(WindowTest, AKeptViewComesBack) {
+  open();
+  const CameraView kept = view_->camera();
+  trigger("keep_view");
+  trigger("back");
+  ASSERT_GT((view_->camera().eye_mm - kept.eye_mm).norm(), 10.0);
+  trigger("view_1");
+  EXPECT_LT((view_->camera().eye_mm - kept.eye_mm).norm(), 1e-6);
+  EXPECT_LT((view_->camera().up - kept.up).norm(), 1e-6);
+  trigger("forget_views");
+  EXPECT_FALSE(window_->findChild<QAction*>("view_1")->isVisible());
+}
+
+// The half of the block that the user opened is not in the picture, and no tool points at it.
+TEST_F(WindowTest, AnOpenedBoneIsPointedAtWhereItIsSeen) {
+  open();
+  click_tool("drill");
+  hover(middle() + QPoint(60, 0));
+  EXPECT_TRUE(until([&] { return view_->pointer().on_bone(); }));
+  auto* panel = window_->findChild<QWidget*>("clipping_panel");
+  ASSERT_NE(panel, nullptr);
+  panel->show();
+  // From above, with the front of the body below, the patient's left side is on the right.
+  window_->findChild<QSlider*>("clip_left")->setValue(100);
+  window_->findChild<QCheckBox*>("clip_box")->setChecked(true);
+  hover(middle() + QPoint(60, 0));
+  EXPECT_FALSE(view_->pointer().on_bone());
+  hover(middle() - QPoint(60, 0));
+  EXPECT_TRUE(view_->pointer().on_bone());
+  QTest::mouseClick(window_->findChild<QPushButton*>("clip_whole"), Qt::LeftButton);
+  hover(middle() + QPoint(60, 0));
+  EXPECT_TRUE(view_->pointer().on_bone());
+}
+
+// In each of the two pictures the pointer finds the same place of the bone.
+TEST_F(WindowTest, APointerIsInEitherPictureSideBySide) {
+  open();
+  click_tool("drill");
+  trigger("stereo_side_by_side");
+  const QPoint left(view_->width() / 4, view_->height() / 2), right = left + QPoint(view_->width() / 2, 0);
+  hover(left);
+  ASSERT_TRUE(view_->pointer().on_bone());
+  const Vec3 by_left = view_->pointer().input().target_mm;
+  hover(right);
+  ASSERT_TRUE(view_->pointer().on_bone());
+  EXPECT_LT((view_->pointer().input().target_mm - by_left).norm(), 0.5);
+  trigger("stereo_quad_buffer");
+  EXPECT_TRUE(window_->statusBar()->currentMessage().contains("quad buffer"));
+  EXPECT_TRUE(window_->findChild<QAction*>("stereo_off")->isChecked());
 }
 
 TEST_F(WindowTest, AKilledHapticClientComesBackAndCutsAgain) {
