@@ -69,7 +69,7 @@ class Unpacker {
     return failure(ErrorCode::invalid_input, name_ + " " + what);
   }
   tl::unexpected<Error> damaged() const {
-    return bad("is not a sound zip archive (" + reason_of(archive_) + "); pack the case again");
+    return bad("is not a sound zip archive (" + reason_of(archive_) + "); copy it or pack the case again");
   }
 
   // The file of a case that an entry contains, if it may be one.

@@ -37,6 +37,26 @@ class Unfinished {
   const std::filesystem::path path_;
 };
 
+// The folders above a path that are not there yet. At the end those that are still empty go.
+class NewParents {
+ public:
+  explicit NewParents(const std::filesystem::path& path) {
+    std::error_code error;
+    for (auto folder = path.parent_path(); !folder.empty() && !std::filesystem::exists(folder, error);
+         folder = folder.parent_path())
+      missing_.push_back(folder);
+  }
+  ~NewParents() {
+    std::error_code ignored;
+    for (const std::filesystem::path& folder : missing_) std::filesystem::remove(folder, ignored);
+  }
+  NewParents(const NewParents&) = delete;
+  NewParents& operator=(const NewParents&) = delete;
+
+ private:
+  std::vector<std::filesystem::path> missing_;  // the deepest first
+};
+
 std::filesystem::path partial_name(const std::filesystem::path& target) {
   return target.string() + ".partial-" + std::to_string(::getpid());
 }
@@ -89,11 +109,20 @@ Result<void> read_pieces(const std::filesystem::path& file, const KeepGoing& kee
   return in.eof() ? Result<void>{} : unreadable();
 }
 
+// The message without the names of folders that nobody has seen.
+std::string without_partial(std::string text) {
+  constexpr std::string_view kMark = ".partial-";
+  for (std::size_t at = 0; (at = text.find(kMark, at)) != std::string::npos;)
+    text.erase(at, text.find_first_not_of("0123456789", at + kMark.size()) - at);
+  return text;
+}
+
 Result<void> copy_file_to(const std::filesystem::path& file, const std::filesystem::path& copy,
                           const KeepGoing& keep_going) {
   std::ofstream out(copy, std::ios::binary);
   const auto full = [&] {
-    return failure(ErrorCode::internal, "cannot write " + copy.parent_path().parent_path().string() +
+    return failure(ErrorCode::internal, "cannot unpack " + file.filename().string() + " to " +
+                                            without_partial(copy.parent_path().parent_path().string()) +
                                             ": the disk accepts no more data; make room on it");
   };
   Result<void> read = read_pieces(file, keep_going, [&](std::span<const char> piece) -> Result<void> {
@@ -120,10 +149,12 @@ void replace_all(std::string& text, const std::string& old, const std::string& n
     text.replace(at, old.size(), now);
 }
 
-// An error of the checking process, without the folder that only it has seen, and with the name of the file.
-Error about_file(Error error, const std::filesystem::path& file, const std::filesystem::path& work) {
-  for (const std::string& folder : {(work / "sent").string(), (work / kSoundCase).string()})
-    replace_all(error.message, folder, file.filename().string());
+// An error of the checking process about what is in `work`, with the names of the file and the target instead.
+Error about_file(Error error, const std::filesystem::path& file, const std::filesystem::path& target,
+                 const std::filesystem::path& work) {
+  replace_all(error.message, (work / "sent").string(), file.filename().string());
+  replace_all(error.message, (work / kSoundCase).string(), target.string());
+  error.message = without_partial(error.message);
   if (error.message.find(file.filename().string()) == std::string::npos)
     error.message = file.string() + ": " + error.message;
   return error;
@@ -155,7 +186,7 @@ Result<void> pack_case_file(const std::filesystem::path& folder, const std::file
       return tl::unexpected(scan.error());
   const Unfinished partial(partial_name(file));
   if (Result<void> packed = pack_case(folder, partial.path(), part(keep_going, 0.4, 1.0)); !packed) {
-    replace_all(packed.error().message, partial.path().string(), file.string());
+    packed.error().message = without_partial(packed.error().message);
     return packed;
   }
   std::filesystem::rename(partial.path(), file, error);
@@ -170,6 +201,7 @@ Result<CheckedCase> unpack_case_file(const std::filesystem::path& program, const
   if (std::filesystem::exists(target, error)) return already_there(target);
   const Result<std::uint64_t> bytes = plain_file_bytes(file);
   if (!bytes) return tl::unexpected(bytes.error());
+  const NewParents parents(target);
   const Unfinished partial(partial_name(target));
   // The process may open files of this folder only. A link to the file would let it change the original.
   std::filesystem::create_directories(partial.path() / kGiven, error);
@@ -186,7 +218,7 @@ Result<CheckedCase> unpack_case_file(const std::filesystem::path& program, const
     return !keep_going(0.1 + 0.89 * std::clamp(written / std::max(1.0, expected), 0.0, 1.0));
   };
   Result<CheckedCase> checked = check_case(program, copy, partial.path(), quota, stop);
-  if (!checked) return tl::unexpected(about_file(checked.error(), file, partial.path()));
+  if (!checked) return tl::unexpected(about_file(checked.error(), file, target, partial.path()));
   if (!keep_going(1.0)) return stopped_while("unpacking " + file.string());
   std::filesystem::rename(partial.path() / kSoundCase, target, error);
   if (error) return cannot_make(target, error);
