@@ -28,13 +28,15 @@ function(osteon_install_program name package)
   endif()
 endfunction()
 
-# The window and the clients: entries of the desktop's menu, an icon, access to the haptic devices, and a plan for the
-# example skull.
+# The window and the clients: entries of the desktop's menu, an icon, the type of a case's file, access to the haptic
+# devices, and a plan for the example skull.
 install(FILES ${PROJECT_SOURCE_DIR}/deploy/desktop/osteon.svg
   DESTINATION ${CMAKE_INSTALL_DATADIR}/icons/hicolor/scalable/apps COMPONENT osteon)
 install(FILES ${PROJECT_SOURCE_DIR}/deploy/desktop/osteon.desktop
               ${PROJECT_SOURCE_DIR}/deploy/desktop/osteon-viewer.desktop
   DESTINATION ${CMAKE_INSTALL_DATADIR}/applications COMPONENT osteon)
+install(FILES ${PROJECT_SOURCE_DIR}/deploy/desktop/osteon-case.xml
+  DESTINATION ${CMAKE_INSTALL_DATADIR}/mime/packages COMPONENT osteon)
 install(FILES ${PROJECT_SOURCE_DIR}/deploy/udev/70-osteon-devices.rules
   DESTINATION lib/udev/rules.d COMPONENT osteon)
 install(FILES ${PROJECT_SOURCE_DIR}/deploy/session/drill-skull.json

@@ -23,7 +23,8 @@ struct Command {
   std::function<Result<std::string>(const StopSignal& stop)> run;
 };
 
-void add_case_commands(CLI::App& app, std::vector<Command>& commands);  // make and describe cases
+void add_case_commands(CLI::App& app, std::vector<Command>& commands);       // make and describe cases
+void add_case_file_commands(CLI::App& app, std::vector<Command>& commands);  // pack a case, and unpack it
 void add_registration_command(CLI::App& app, std::vector<Command>& commands);
 void add_subvolume_command(CLI::App& app, std::vector<Command>& commands);
 void add_phantom_command(CLI::App& app, std::vector<Command>& commands);

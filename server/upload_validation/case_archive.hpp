@@ -11,6 +11,7 @@
 #include <string>
 #include <string_view>
 
+#include "common/core/keep_going.hpp"
 #include "common/core/result.hpp"
 
 namespace osteon {
@@ -48,7 +49,10 @@ using PutPiece = std::function<Result<void>(std::string_view file, std::span<con
                                                                        const std::string& name,
                                                                        const UploadQuota& quota, const PutPiece& put);
 
-// Writes a case's folder as an archive. Errors: not_found (no case there), internal (disk).
-[[nodiscard]] Result<void> pack_case(const std::filesystem::path& folder, const std::filesystem::path& archive);
+// Writes a case's folder as an archive. The same files always become the same bytes: case.json comes first, and entries
+// have no time and no owner. Errors: not_found (no case there), internal (disk), cancelled. After an error the archive
+// may be there in part.
+[[nodiscard]] Result<void> pack_case(const std::filesystem::path& folder, const std::filesystem::path& archive,
+                                     const KeepGoing& keep_going = {});
 
 }  // namespace osteon

@@ -195,7 +195,7 @@ class Files {
  private:
   static Result<void> no_space(std::string_view file) {
     return failure(ErrorCode::internal,
-                   "the server cannot unpack " + std::string(file) + ": its disk accepts no more data");
+                   "cannot unpack " + std::string(file) + ": the disk accepts no more data; make room on it");
   }
   const fs::path folder_;
   std::string name_;
@@ -217,7 +217,7 @@ Error not_sound(const Error& error) {
 Result<SentCase> unpack_and_read(const fs::path& archive, const fs::path& sent, const UploadQuota& quota) {
   std::error_code error;
   fs::create_directory(sent, error);
-  if (error) return failure(ErrorCode::internal, "the server cannot unpack a case: " + error.message());
+  if (error) return failure(ErrorCode::internal, "cannot unpack the case: " + error.message());
   Files files(sent);
   const auto put = [&](std::string_view file, std::span<const std::byte> piece) { return files.put(file, piece); };
   const auto unpacked = unpack_case(archive, quota, put);

@@ -27,7 +27,7 @@ SERVER_LAYERS = {
     "room": set(),
     "journal": set(),
     "upload_validation": set(),
-    "import": set(),
+    "import": {"upload_validation"},
     "audit": {"journal"},
     "auth": {"audit"},
     "publish": {"journal", "room"},

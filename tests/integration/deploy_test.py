@@ -1,5 +1,6 @@
 """The scripts under deploy/ where they were not made for: a moved checkout, another user's, two at a time."""
 import fcntl
+import io
 import os
 import re
 import shutil
@@ -10,7 +11,9 @@ import tempfile
 import threading
 import time
 import unittest
+import zipfile
 from pathlib import Path
+from xml.etree import ElementTree
 
 ROOT = Path(os.environ["OSTEON_SOURCE_DIR"])
 sys.path[:0] = [str(ROOT / "deploy"), str(ROOT / "deploy/session")]
@@ -244,6 +247,37 @@ class Packages(unittest.TestCase):
         known = {"libc6": "c", "libx2": "x"}
         about = {"Depends": "libx1 | libx2, libc6 (>= 2.36), other:any"}
         self.assertEqual(components.depends(about, known), ["c", "x"])
+
+
+class Desktop(unittest.TestCase):
+    def setUp(self):
+        self.folder = ROOT / "deploy/desktop"
+        names = {"m": "http://www.freedesktop.org/standards/shared-mime-info"}
+        self.kind = ElementTree.parse(self.folder / "osteon-case.xml").getroot().find("m:mime-type", names)
+        self.glob = self.kind.find("m:glob", names).get("pattern")
+        self.magic = [(int(match.get("offset")), match.get("value").encode().decode("unicode_escape").encode("latin-1"))
+                      for match in self.kind.iterfind(".//m:match", names)]
+
+    def test_the_window_opens_the_type_of_a_case_file(self):
+        entry = (self.folder / "osteon.desktop").read_text(encoding="utf-8")
+        self.assertIn(f"MimeType={self.kind.get('type')};\n", entry)
+        self.assertIn("Exec=osteon %f\n", entry)
+        self.assertEqual(self.glob, "*.osteon")
+
+    def test_the_package_has_it(self):
+        self.assertIn("usr/share/mime/packages/osteon-case.xml\n",
+                      (ROOT / "deploy/debian/osteon.install").read_text(encoding="utf-8"))
+
+    def test_the_magic_is_that_of_a_zip_with_case_json_first(self):
+        def known(*names):
+            made = io.BytesIO()
+            with zipfile.ZipFile(made, "w", zipfile.ZIP_DEFLATED) as archive:
+                for name in names:
+                    archive.writestr(name, "{}")
+            return all(made.getvalue()[at:].startswith(value) for at, value in self.magic)
+        self.assertTrue(known("case.json", "bone.vdb"))
+        self.assertFalse(known("bone.vdb", "case.json"))
+        self.assertFalse(known("holiday.jpg"))
 
 
 class Nightly(unittest.TestCase):

@@ -8,9 +8,11 @@
 #include <QCheckBox>
 #include <QComboBox>
 #include <QCursor>
+#include <QDropEvent>
 #include <QLabel>
 #include <QListWidget>
 #include <QMenu>
+#include <QMimeData>
 #include <QPushButton>
 #include <QSlider>
 #include <QSpinBox>
@@ -19,6 +21,7 @@
 #include <QSurfaceFormat>
 #include <QTest>
 #include <QToolButton>
+#include <QUrl>
 #include <QWheelEvent>
 #include <QWindow>
 #include <chrono>
@@ -382,6 +385,54 @@ TEST_F(WindowTest, ClosingInTheMiddleOfACutEndsAllAndKeepsTheCut) {
   ASSERT_GE(list->count(), 1);
   QTest::mouseClick(list->viewport(), Qt::LeftButton, {}, list->visualItemRect(list->item(0)).center());
   EXPECT_TRUE(until([&] { return view_->surface_shown() && cut(); })) << problem();
+}
+
+TEST_F(WindowTest, ACaseInOneFileIsSavedOpenedAndDropped) {
+  const std::filesystem::path file = desk_->temp().path() / "My block.osteon";
+  open();
+  window_->save_case_file(QString::fromStdString(file.string()));
+  ASSERT_TRUE(until([&] { return window_->statusBar()->currentMessage().startsWith("Saved"); })) << problem();
+  ASSERT_TRUE(std::filesystem::exists(file));
+  const auto others = [] {
+    std::vector<std::filesystem::path> found;
+    std::error_code ignored;
+    for (const auto& entry : std::filesystem::directory_iterator(cases_folder(), ignored)) found.push_back(entry);
+    return found;
+  };
+  EXPECT_TRUE(others().empty()) << "the saving left something behind";
+
+  window_->open_case_file(file);
+  EXPECT_FALSE(view_->surface_shown()) << "the window waits for it";
+  ASSERT_TRUE(until([&] { return view_->surface_shown(); })) << problem();
+  EXPECT_EQ(window_->windowTitle().toStdString(), "My block.osteon – Osteon");
+  ASSERT_TRUE(until([&] { return label("device") == "Pointer"; })) << problem();
+  EXPECT_TRUE(recent_entries().front().title.startsWith("My block.osteon"))
+      << recent_entries().front().title.toStdString();
+  ASSERT_EQ(others().size(), 1u);
+  const auto unpacked = others().front();
+  const auto made = std::filesystem::last_write_time(unpacked);
+
+  // Once more, with the mouse of a file manager: the same folder.
+  QMimeData data;
+  data.setUrls({QUrl::fromLocalFile(QString::fromStdString(file.string()))});
+  QDragEnterEvent enters(middle(), Qt::CopyAction, &data, Qt::LeftButton, Qt::NoModifier);
+  QApplication::sendEvent(window_.get(), &enters);
+  EXPECT_TRUE(enters.isAccepted());
+  QDropEvent drops(middle(), Qt::CopyAction, &data, Qt::LeftButton, Qt::NoModifier);
+  QApplication::sendEvent(window_.get(), &drops);
+  ASSERT_TRUE(until([&] { return !view_->surface_shown(); }));
+  ASSERT_TRUE(until([&] { return view_->surface_shown(); })) << problem();
+  ASSERT_EQ(others().size(), 1u);
+  EXPECT_EQ(std::filesystem::last_write_time(others().front()), made);
+}
+
+TEST_F(WindowTest, AFileThatIsNoCaseIsRefusedWithASentence) {
+  const std::filesystem::path picture = desk_->temp().path() / "picture.osteon";
+  std::ofstream(picture) << "this is no archive";
+  window_->open_case_file(picture);
+  ASSERT_TRUE(until([&] { return label("words").contains("picture.osteon is not"); })) << problem();
+  EXPECT_FALSE(label("words").contains("\n"));
+  EXPECT_TRUE(window_->findChild<QListWidget*>("examples")->isEnabled());
 }
 
 TEST_F(WindowTest, ABoneThatIsNoneIsRefusedWithASentence) {

@@ -2,13 +2,11 @@
 
 #include <QCoreApplication>
 #include <QDateTime>
-#include <QDir>
 #include <QFile>
 #include <QJsonDocument>
 #include <QJsonObject>
 #include <QSettings>
 #include <QStandardPaths>
-#include <QTimer>
 #include <utility>
 
 namespace osteon {
@@ -16,7 +14,6 @@ namespace osteon {
 namespace {
 
 constexpr int kMostRecent = 12;
-constexpr int kProgressPeriod_ms = 150;
 // Debian's package invesalius-examples installs it.
 constexpr const char* kSkullScan = "/usr/share/doc/invesalius-examples/examples/Cranium.inv3";
 
@@ -45,9 +42,9 @@ std::vector<ExampleBone> example_bones() {
   return bones;
 }
 
-std::filesystem::path example_folder(const ExampleBone& bone) {
-  return data_folder() / "cases" / bone.id.toStdString();
-}
+std::filesystem::path cases_folder() { return data_folder() / "cases"; }
+
+std::filesystem::path example_folder(const ExampleBone& bone) { return cases_folder() / bone.id.toStdString(); }
 
 std::filesystem::path new_session_folder(const std::filesystem::path& bone) {
   const std::string day = QDateTime::currentDateTime().toString("yyyy-MM-dd-HHmmss").toStdString();
@@ -55,6 +52,11 @@ std::filesystem::path new_session_folder(const std::filesystem::path& bone) {
   std::filesystem::path free = base;
   for (int n = 2; std::filesystem::exists(free); ++n) free = base.string() + "-" + std::to_string(n);
   return free;
+}
+
+bool is_file(const std::filesystem::path& path) {
+  std::error_code ignored;
+  return std::filesystem::is_regular_file(path, ignored);
 }
 
 bool is_case(const std::filesystem::path& folder) {
@@ -101,52 +103,26 @@ void remember(const RecentEntry& entry) {
 }
 
 CaseMaker::CaseMaker(QStringList how, std::filesystem::path out, Events events)
-    : how_(std::move(how)), out_(std::move(out)), events_(std::move(events)) {
-  connect(&progress_timer_, &QTimer::timeout, this, [this] { read_progress(); });
+    : out_(std::move(out)), events_(std::move(events)) {
+  const std::filesystem::path log =
+      out_.empty() ? cases_folder() / ("unpack-" + std::to_string(QCoreApplication::applicationPid())) : out_;
+  how += out_.empty() ? QStringList{"--into", text_of(cases_folder())} : QStringList{"--out", text_of(out_)};
+  run_ = std::make_unique<ImporterRun>(
+      how, text_of(log) + ".log",
+      ImporterRun::Events{events_.progress, [this](const QString& said) { ended(said); }, events_.failed});
 }
 
-void CaseMaker::start() {
-  const QString folder = text_of(out_.parent_path());
-  if (!QDir().mkpath(folder))
-    return events_.failed(tr("Cannot make the folder %1. Choose a place where you may write.").arg(folder));
-  log_file_ = text_of(out_) + ".log";
-  importer_ = std::make_unique<ChildProcess>(log_file_);
-  connect(importer_.get(), QOverload<int, QProcess::ExitStatus>::of(&QProcess::finished), this,
-          [this](int code, QProcess::ExitStatus how) { ended(how == QProcess::NormalExit ? code : -1); });
-  connect(importer_.get(), &QProcess::errorOccurred, this, [this](QProcess::ProcessError error) {
-    if (error != QProcess::FailedToStart) return;
-    progress_timer_.stop();
-    events_.failed(tr("osteon-import is not installed. Install the package osteon-import."));
-  });
-  importer_->start(program_path("osteon-import"), how_ + QStringList{"--out", text_of(out_)});
-  progress_timer_.start(kProgressPeriod_ms);
-}
+void CaseMaker::start() { run_->start(); }
 
-void CaseMaker::cancel() {
-  cancelled_ = true;
-  if (importer_) importer_->terminate();
-}
+void CaseMaker::cancel() { run_->cancel(); }
 
-void CaseMaker::read_progress() {
-  QFile file(log_file_);
-  if (!file.open(QIODevice::ReadOnly)) return;
-  const QString all = QString::fromUtf8(file.readAll());
-  // The last number before a percent sign.
-  const int sign = all.lastIndexOf('%');
-  if (sign < 0) return;
-  int begin = sign;
-  while (begin > 0 && (all[begin - 1].isDigit() || all[begin - 1] == ' ')) --begin;
-  bool number = false;
-  const int percent = all.mid(begin, sign - begin).trimmed().toInt(&number);
-  if (number) events_.progress(percent);
-}
-
-void CaseMaker::ended(int code) {
-  progress_timer_.stop();
-  const QString why = importer_->last_sentence();
-  QFile::remove(log_file_);
-  if (code == 0 && is_case(out_)) return events_.made(out_);
-  events_.failed(cancelled_ ? QString() : why.isEmpty() ? tr("osteon-import ended without a case.") : why);
+void CaseMaker::ended(const QString& said) {
+  // "folder", blanks, and the name.
+  const QString line = said.section('\n', 0, 0);
+  const std::filesystem::path made =
+      out_.empty() && line.startsWith("folder ") ? path_of(line.section(' ', 1, -1).trimmed()) : out_;
+  if (!made.empty() && is_case(made)) return events_.made(made);
+  events_.failed(tr("osteon-import ended without a case."));
 }
 
 }  // namespace osteon

@@ -4,13 +4,12 @@
 #include <QCoreApplication>
 #include <QString>
 #include <QStringList>
-#include <QTimer>
 #include <filesystem>
 #include <functional>
 #include <memory>
 #include <vector>
 
-#include "viewer_client/desktop/child_process.hpp"
+#include "viewer_client/desktop/importer_run.hpp"
 
 namespace osteon {
 
@@ -34,11 +33,13 @@ struct RecentEntry {
 void remember(const RecentEntry& entry);
 
 [[nodiscard]] std::filesystem::path data_folder();
+[[nodiscard]] std::filesystem::path cases_folder();                           // of the cases that the window has made
 [[nodiscard]] std::filesystem::path example_folder(const ExampleBone& bone);  // of its case
 [[nodiscard]] std::filesystem::path new_session_folder(const std::filesystem::path& bone);
 // The title of a case, or the name of its folder.
 [[nodiscard]] QString case_title(const std::filesystem::path& bone);
 [[nodiscard]] bool is_case(const std::filesystem::path& folder);
+[[nodiscard]] bool is_file(const std::filesystem::path& path);  // a plain one
 
 // Makes a case by osteon-import. It can be cancelled at any time; then nothing is left.
 class CaseMaker : public QObject {
@@ -50,23 +51,19 @@ class CaseMaker : public QObject {
     std::function<void(const std::filesystem::path& bone)> made;
     std::function<void(const QString& sentence)> failed;  // empty: cancelled
   };
-  // `how`: arguments of osteon-import without --out.
+  // `how`: arguments of osteon-import without --out. `out`: folder of the case. Empty: `how` is "unpack FILE", whose
+  // folder in cases_folder() is named by the content of FILE.
   CaseMaker(QStringList how, std::filesystem::path out, Events events);
 
   void start();
   void cancel();
 
  private:
-  void read_progress();
-  void ended(int code);
+  void ended(const QString& said);
 
-  QStringList how_;
   std::filesystem::path out_;
   Events events_;
-  bool cancelled_ = false;
-  QString log_file_;
-  QTimer progress_timer_;
-  std::unique_ptr<ChildProcess> importer_;
+  std::unique_ptr<ImporterRun> run_;
 };
 
 }  // namespace osteon

@@ -31,7 +31,7 @@ struct Arguments {
 int main(int argc, char** argv) {
   Arguments arguments;
   CLI::App app{"Practise bone surgery in a window: open a bone, take a tool with the mouse, and cut.", kProgram};
-  app.add_option("CASE", arguments.bone, "Folder of a case to open, as osteon-import writes it");
+  app.add_option("CASE", arguments.bone, "Case to open: an .osteon file, or a folder as osteon-import writes it");
   app.add_option("--example", arguments.example,
                  "Opens a bone that comes with Osteon: skull, femur, tibia, patella, "
                  "knee, hip or pelvis");
@@ -73,11 +73,16 @@ int main(int argc, char** argv) {
     window.join({QString::fromStdString(arguments.server), QString::fromStdString(arguments.room),
                  QString::fromStdString(arguments.name), *credentials});
   } else if (!arguments.bone.empty()) {
-    if (!is_case(arguments.bone))
-      return log::exit_with(kProgram,
-                            {ErrorCode::not_found, arguments.bone + " is not the folder of a case: it has no "
-                                                                    "case.json; name one that osteon-import wrote"});
-    window.practise(arguments.bone);
+    if (is_case(arguments.bone)) {
+      window.practise(arguments.bone);
+    } else if (is_file(arguments.bone)) {
+      window.open_case_file(arguments.bone);
+    } else {
+      return log::exit_with(
+          kProgram,
+          {ErrorCode::not_found, arguments.bone + " is neither a file nor the folder of a case: it has no "
+                                                  "case.json; name an .osteon file, or what osteon-import wrote"});
+    }
   } else if (!arguments.example.empty()) {
     std::string names;
     for (const ExampleBone& bone : example_bones()) {

@@ -8,6 +8,7 @@
 #include <QDialogButtonBox>
 #include <QDir>
 #include <QDockWidget>
+#include <QDragEnterEvent>
 #include <QFileDialog>
 #include <QFormLayout>
 #include <QInputDialog>
@@ -16,10 +17,13 @@
 #include <QLocale>
 #include <QMenuBar>
 #include <QMessageBox>
+#include <QMimeData>
 #include <QSettings>
 #include <QStackedWidget>
+#include <QStandardPaths>
 #include <QStatusBar>
 #include <QToolBar>
+#include <QUrl>
 #include <algorithm>
 #include <utility>
 
@@ -47,12 +51,20 @@ bool is_held(const std::string& name) {
   return tool && tool->cuts() && tool->kind != ToolKind::pin && tool->kind != ToolKind::screw;
 }
 
+// The first file or folder that somebody drags over the window. Empty: none on this computer.
+std::filesystem::path dragged_path(const QMimeData& data) {
+  for (const QUrl& url : data.urls())
+    if (url.isLocalFile()) return url.toLocalFile().toStdString();
+  return {};
+}
+
 }  // namespace
 
 MainWindow::MainWindow() {
   setWindowTitle("Osteon");
   setObjectName("osteon");
   resize(1280, 800);
+  setAcceptDrops(true);
   pages_ = new QStackedWidget;
   start_ = new StartPage({[this](const ExampleBone& bone) { open_example(bone); },
                           [this](const RecentEntry& entry) { practise(entry.bone, entry.session); },
@@ -135,6 +147,8 @@ void MainWindow::make_file_menu() {
   file->addSeparator();
   add_action(
       file, tr("Save a &picture…"), "save_picture", QKeySequence::Save, [this] { save_picture(); }, true);
+  add_action(
+      file, tr("Save &bone as…"), "save_bone", QKeySequence("Ctrl+E"), [this] { save_bone_as(); }, true);
   file->addSeparator();
   add_action(
       file, tr("&Quit"), "quit", QKeySequence::Quit, [this] { close(); }, false);
@@ -257,17 +271,18 @@ void MainWindow::enable_room_actions(bool on) {
 
 void MainWindow::say(const QString& sentence) { statusBar()->showMessage(sentence, kMessage_ms); }
 
-void MainWindow::make_case(const QString& what, const QStringList& how, const std::filesystem::path& out) {
+void MainWindow::make_case(const QString& what, const QStringList& how, const std::filesystem::path& out,
+                           const QString& name) {
   if (maker_) return;
   start_->show_work(what);
   pages_->setCurrentWidget(start_);
   maker_ = std::make_unique<CaseMaker>(
       how, out,
       CaseMaker::Events{[this](int percent) { start_->show_progress(percent); },
-                        [this](const std::filesystem::path& bone) {
+                        [this, name](const std::filesystem::path& bone) {
                           maker_.release()->deleteLater();
                           start_->end_work({});
-                          practise(bone);
+                          practise(bone, {}, name);
                         },
                         [this](const QString& sentence) {
                           maker_.release()->deleteLater();
@@ -298,16 +313,64 @@ void MainWindow::choose_scan() {
 }
 
 void MainWindow::choose_case() {
-  const QString folder = QFileDialog::getExistingDirectory(this, tr("The folder of a case"));
-  if (folder.isEmpty()) return;
-  if (!is_case(folder.toStdString())) {
-    QMessageBox::warning(
-        this, "Osteon",
-        tr("%1 is not the folder of a case: it has no case.json. Choose such a folder, or import a CT.").arg(folder));
-    return;
-  }
+  // A file dialog chooses files only, so a folder is chosen by its case.json.
+  const QString chosen =
+      QFileDialog::getOpenFileName(this, tr("Open a case"), {}, tr("Cases (*.osteon case.json);;All files (*)"));
+  if (chosen.isEmpty()) return;
+  const std::filesystem::path path = chosen.toStdString();
+  if (path.filename() != "case.json") return open_case_file(path);
   leave_room();
-  practise(folder.toStdString());
+  practise(path.parent_path());
+}
+
+void MainWindow::open_case_file(const std::filesystem::path& file) {
+  if (maker_) return;
+  leave_room();
+  const QString name = text_of(file.filename());
+  make_case(tr("Opening %1").arg(name), {"unpack", text_of(std::filesystem::absolute(file))}, {}, name);
+}
+
+void MainWindow::save_bone_as() {
+  if (!opened_) return;
+  // With a suffix of its own the dialog asks before it names a file that is there.
+  QFileDialog dialog(this, tr("Save the bone"), {}, tr("Cases (*.osteon)"));
+  dialog.setAcceptMode(QFileDialog::AcceptSave);
+  dialog.setDefaultSuffix("osteon");
+  dialog.selectFile(QFileInfo(case_title(opened_->bone)).fileName() + ".osteon");
+  if (dialog.exec() == QDialog::Accepted) save_case_file(dialog.selectedFiles().constFirst());
+}
+
+void MainWindow::save_case_file(const QString& file) {
+  if (!opened_) return;
+  if (saver_) return say(tr("Another bone is being saved. Try again when that is done."));
+  const QString log = text_of(cases_folder() / "pack-") + QString::number(QCoreApplication::applicationPid()) + ".log";
+  const auto end = [this](const QString& sentence) {
+    saver_.release()->deleteLater();
+    say(sentence);
+  };
+  // The dialog has asked whether to write over a file that is there.
+  saver_ = std::make_unique<ImporterRun>(
+      QStringList{"pack", "--replace", text_of(opened_->bone), file}, log,
+      ImporterRun::Events{[this, file](int percent) { say(tr("Saving %1: %2 %").arg(file, QString::number(percent))); },
+                          [end, file](const QString&) { end(tr("Saved %1.").arg(file)); },
+                          [end](const QString& why) { end(why); }});
+  saver_->start();
+}
+
+void MainWindow::dragEnterEvent(QDragEnterEvent* event) {
+  if (!maker_ && !dragged_path(*event->mimeData()).empty()) event->acceptProposedAction();
+}
+
+void MainWindow::dropEvent(QDropEvent* event) {
+  const std::filesystem::path path = dragged_path(*event->mimeData());
+  if (maker_ || path.empty()) return;
+  event->acceptProposedAction();
+  // Later, so that the program from which it comes need not wait.
+  QTimer::singleShot(0, this, [this, path] {
+    if (is_case(path)) return practise(path);
+    if (is_file(path) && path.extension() == ".osteon") return open_case_file(path);
+    say(tr("%1 is no case: drop an .osteon file, or the folder of a case.").arg(text_of(path)));
+  });
 }
 
 void MainWindow::choose_room() {
@@ -345,7 +408,8 @@ void MainWindow::choose_room() {
   join({address->text(), room->text(), name->text(), *credentials});
 }
 
-void MainWindow::practise(const std::filesystem::path& bone, const std::filesystem::path& session) {
+void MainWindow::practise(const std::filesystem::path& bone, const std::filesystem::path& session,
+                          const QString& name) {
   leave_room();
   PracticeOptions options;
   options.bone = bone;
@@ -361,7 +425,7 @@ void MainWindow::practise(const std::filesystem::path& bone, const std::filesyst
   auto pointer = PointerServer::listen(options.pointer);
   if (!pointer) return room_ended(QString::fromStdString(pointer.error().message));
   pointer_ = std::move(*pointer);
-  const QString title = case_title(bone);
+  const QString title = name.isEmpty() ? case_title(bone) : name;
   opened_ = RecentEntry{tr("%1, %2").arg(title, QLocale().toString(QDateTime::currentDateTime(), QLocale::ShortFormat)),
                         bone, options.folder};
   if (!session.empty())
@@ -410,6 +474,7 @@ void MainWindow::show_joined(const WatchedRoom& room) {
   pages_->setCurrentWidget(view_);
   if (!practice_) setWindowTitle(tr("%1 – Osteon").arg(QString::fromStdString(room.case_title)));
   enable_room_actions(true);
+  findChild<QAction*>("save_bone")->setEnabled(opened_.has_value());  // others' rooms have the bone at their server
   gauge_timer_.start(kGaugePeriod_ms);
   if (pointer_) pointer_timer_.start(kPointerPeriod_ms);
   if (opened_) remember(*opened_);

@@ -45,13 +45,20 @@ class MainWindow : public QMainWindow {
   ~MainWindow() override;
 
   // Opens a case to practise on, alone. `session`: a folder of an earlier session to go on with; empty: a new one.
-  void practise(const std::filesystem::path& bone, const std::filesystem::path& session = {});
+  // `name`: shown to people; empty: the title of the case.
+  void practise(const std::filesystem::path& bone, const std::filesystem::path& session = {}, const QString& name = {});
+  // A case in one file. It is unpacked into the user's data folder first, once for each content.
+  void open_case_file(const std::filesystem::path& file);
+  // The case of the practice room as one file. Goes on in the background.
+  void save_case_file(const QString& file);
   void open_example(const ExampleBone& bone);
   void join(const RoomAddress& room);
   void import_scan(const QString& source);
 
  protected:
   void closeEvent(QCloseEvent* event) override;
+  void dragEnterEvent(QDragEnterEvent* event) override;
+  void dropEvent(QDropEvent* event) override;
 
  private:
   // An action in a menu. `in_room`: it is of use in a room only.
@@ -66,9 +73,11 @@ class MainWindow : public QMainWindow {
   void make_panels();
   void make_status();
 
-  void make_case(const QString& what, const QStringList& how, const std::filesystem::path& out);
+  void make_case(const QString& what, const QStringList& how, const std::filesystem::path& out,
+                 const QString& name = {});
   void choose_scan();
   void choose_case();
+  void save_bone_as();
   void choose_room();
   void leave_room();
   void room_opened(const QString& address);
@@ -103,6 +112,7 @@ class MainWindow : public QMainWindow {
   QAction *sound_ = nullptr, *spindle_ = nullptr;
 
   std::unique_ptr<CaseMaker> maker_;
+  std::unique_ptr<ImporterRun> saver_;
   std::unique_ptr<PointerServer> pointer_;
   std::unique_ptr<PracticeRoom> practice_;
   std::unique_ptr<RoomLink> room_;

@@ -1,7 +1,5 @@
 #include "server/upload_validation/case_archive.hpp"
 
-#include <archive.h>
-#include <archive_entry.h>
 #include <gtest/gtest.h>
 
 #include <fstream>
@@ -9,47 +7,14 @@
 #include <vector>
 
 #include "tests/support/temp_dir.hpp"
+#include "tests/unit/upload_validation/zip_bytes.hpp"
 
 namespace osteon {
 namespace {
 
-using Bytes = std::vector<std::byte>;
-
-struct Entry {
-  std::string path;
-  std::string content{};
-  std::string link{};  // target of a symbolic link
-  bool hard = false;   // a hard link
-  unsigned type = AE_IFREG;
-};
-
-// A zip archive in memory, which can contain whatever an attacker may put in. libarchive makes it.
-Bytes zip(const std::vector<Entry>& entries, const char* options = nullptr) {
-  Bytes bytes(64 << 20);
-  std::size_t used = 0;
-  archive* a = archive_write_new();
-  archive_write_set_format_zip(a);
-  if (options != nullptr) {
-    EXPECT_EQ(archive_write_set_options(a, options), ARCHIVE_OK);
-    archive_write_set_passphrase(a, "secret");
-  }
-  archive_write_open_memory(a, bytes.data(), bytes.size(), &used);
-  for (const Entry& one : entries) {
-    archive_entry* entry = archive_entry_new();
-    archive_entry_set_pathname(entry, one.path.c_str());
-    archive_entry_set_filetype(entry, one.type);
-    archive_entry_set_perm(entry, 0644);
-    if (!one.link.empty()) (one.hard ? archive_entry_set_hardlink : archive_entry_set_symlink)(entry, one.link.c_str());
-    archive_entry_set_size(entry, static_cast<la_int64_t>(one.content.size()));
-    EXPECT_LE(archive_write_header(a, entry), ARCHIVE_OK);
-    archive_write_data(a, one.content.data(), one.content.size());
-    archive_entry_free(entry);
-  }
-  archive_write_close(a);
-  archive_write_free(a);
-  bytes.resize(used);
-  return bytes;
-}
+using test::Bytes;
+using test::Entry;
+using test::zip;
 
 struct Unpacked {
   std::map<std::string, std::string> files;
@@ -81,7 +46,7 @@ TEST(CaseArchive, FilesAtTheTopOrInOneFolderComeOut) {
   ASSERT_TRUE(top) << top.error().message;
   EXPECT_EQ(top->files.at("bone.vdb"), "not really");
   const auto within =
-      unpack(zip({{"skull/", "", "", false, AE_IFDIR}, {"skull/case.json", "{}"}, {"skull/bone.vdb", "x"}}));
+      unpack(zip({{"skull/", "", "", false, test::kFolderEntry}, {"skull/case.json", "{}"}, {"skull/bone.vdb", "x"}}));
   ASSERT_TRUE(within) << within.error().message;
   EXPECT_EQ(within->files.size(), 2U);
 }
@@ -107,7 +72,7 @@ TEST(CaseArchive, NothingElseIsTaken) {
       {"a folder of backslashes", {"..\\x/bone.vdb", "x"}},
       {"another file", {"readme.txt", "x"}},
       {"a hidden ending", {"bone.vdb/x", "x"}},
-      {"a symbolic link", {"bone.vdb", "", "/etc/passwd", false, AE_IFLNK}},
+      {"a symbolic link", {"bone.vdb", "", "/etc/passwd", false, test::kLinkEntry}},
       {"a name of nothing", {"", "x"}},
       {"twice", {"case.json", "{\"other\":1}"}},
       {"in another folder", {"b/case.json", "{}"}},
@@ -154,7 +119,7 @@ TEST(CaseArchive, BombsStopAtTheQuota) {
   EXPECT_LE(put, small.unpacked_bytes);  // no byte beyond the quota was written
 
   std::vector<Entry> many = kCase;
-  for (int i = 0; i < 20; ++i) many.push_back({"d" + std::to_string(i) + "/", "", "", false, AE_IFDIR});
+  for (int i = 0; i < 20; ++i) many.push_back({"d" + std::to_string(i) + "/", "", "", false, test::kFolderEntry});
   const auto entries = unpack(zip(many));
   ASSERT_FALSE(entries);
   EXPECT_EQ(entries.error().code, ErrorCode::exhausted);
