@@ -40,12 +40,15 @@ constexpr int kPointerPeriod_ms = 50;
 constexpr int kMessage_ms = 8000;
 constexpr const char* kFirstTool = "drill-3.2";
 
-bool is_held(const std::string& name) {
+// What changes the room, beside the tools.
+constexpr const char* kWorkActions[] = {"undo", "redo", "mark", "put_down", "spindle"};
+
+}  // namespace
+
+bool MainWindow::can_hold(const std::string& name) {
   const Result<Tool> tool = find_tool(name);
   return tool && tool->cuts() && tool->kind != ToolKind::pin && tool->kind != ToolKind::screw;
 }
-
-}  // namespace
 
 MainWindow::MainWindow() {
   setWindowTitle("Osteon");
@@ -241,8 +244,10 @@ void MainWindow::make_status() {
 
 void MainWindow::enable_room_actions(bool on) {
   for (QAction* action : room_actions_) action->setEnabled(on);
-  tools_->setEnabled(on);
+  tools_->setEnabled(on && !watching_);
   for (QDockWidget* panel : findChildren<QDockWidget*>()) panel->setEnabled(on);
+  if (watching_)
+    for (const char* name : kWorkActions) findChild<QAction*>(name)->setEnabled(false);
 }
 
 void MainWindow::say(const QString& sentence) { statusBar()->showMessage(sentence, kMessage_ms); }
@@ -341,7 +346,7 @@ void MainWindow::practise(const std::filesystem::path& bone, const std::filesyst
   options.bone = bone;
   options.folder = session.empty() ? new_session_folder(bone) : session;
   options.cache = data_folder() / "cache";
-  options.tool = kFirstTool;
+  options.tool = first_tool_.empty() ? kFirstTool : QString::fromStdString(first_tool_);
   options.sound = sound_->isChecked();
   QDir().mkpath(text_of(options.cache));
 
@@ -391,6 +396,21 @@ void MainWindow::join(const RoomAddress& room) {
                        [this](const Error& error) { room_ended(QString::fromStdString(error.message)); }});
 }
 
+void MainWindow::watch(const RoomAddress& room) {
+  leave_room();
+  join(room);
+  set_watching(true);
+}
+
+void MainWindow::hold_first(const std::string& tool) {
+  if (can_hold(tool)) first_tool_ = tool;
+}
+
+void MainWindow::set_watching(bool on) {
+  watching_ = on;
+  view_->set_following(on);
+}
+
 void MainWindow::show_joined(const WatchedRoom& room) {
   view_->show_room(&room_->queue(), room.bounds);
   view_->set_notice({});
@@ -402,7 +422,9 @@ void MainWindow::show_joined(const WatchedRoom& room) {
   if (pointer_) pointer_timer_.start(kPointerPeriod_ms);
   if (opened_) remember(*opened_);
   view_->setFocus();
+  if (watching_) return say(tr("You watch. The view follows the tool; a drag turns the bone, T follows again."));
   say(tr("Choose a tool on the left, then hold the left button on the bone."));
+  if (practice_ && !first_tool_.empty()) take_tool(std::exchange(first_tool_, {}));
 }
 
 void MainWindow::leave_room() {
@@ -415,6 +437,7 @@ void MainWindow::leave_room() {
   practice_.reset();
   pointer_.reset();
   opened_.reset();
+  set_watching(false);
   enable_room_actions(false);
   setWindowTitle("Osteon");
   for (QLabel* label : {device_, position_, connection_}) label->clear();
@@ -431,10 +454,10 @@ void MainWindow::room_ended(const QString& sentence) {
 }
 
 void MainWindow::take_tool(const std::string& tool) {
-  if (!room_) return;
+  if (!room_ || watching_) return tools_->show_held({});
   properties_->show_tool(tool);
   tools_->show_held(tool);
-  if (is_held(tool) && pointer_) {
+  if (can_hold(tool) && pointer_) {
     placing_.clear();
     view_->pointer().take(tool);
     view_->set_holding(true);
