@@ -14,6 +14,7 @@ import plans
 import plots
 import record
 import report
+import screen
 import together
 from processes import Failure
 from session import ROOT, Session, case_info, save
@@ -23,6 +24,7 @@ EXAMPLE = "usr/share/doc/invesalius-examples/examples/Cranium.inv3"
 
 # A desktop device that can hold 3.3 N. The rendered force is what such a device would show.
 DEVICE = "simulated-3.3N"
+FIRST_TOOL = "drill-3.2"
 
 def say(line):
     print(line, flush=True)
@@ -115,11 +117,12 @@ def make_case(what, command, case: Path):
     say(f"Imported in {time.monotonic() - started:.0f} s; the next run finds the case in build/cases.")
 
 
-def run_on_some_side(programs, case, entries, out):
+def run_on_some_side(programs, case, entries, out, window):
     """Runs the session. If there is no bone at one entry, the next one is tried."""
     for entry in entries:
         try:
-            return Session(programs, case, plans.drill_and_window(entry), out, say, device=DEVICE).run()
+            return Session(programs, case, plans.drill_and_window(entry), out, say, device=DEVICE,
+                           window=window).run()
         except Failure as failure:
             if entry == entries[-1] or "entry" not in failure.detail:
                 raise
@@ -131,25 +134,55 @@ def case_title(programs, case):
     return case_info(programs, case).get("title") or case.name
 
 
+def chosen_case(options, programs):
+    if options.bone:
+        return phantom_case(options.bone, programs)
+    if options.case:
+        return prepare_case(options.case.resolve(), programs, [])
+    return prepare_case(example_skull().resolve(), programs, ["--title", "Human skull"])
+
+
+def try_it(options, programs):
+    """The window `osteon` with the drill in the hand, until the user closes it. It ends the programs that it starts."""
+    case = chosen_case(options, programs)
+    if not screen.display_opens():
+        raise Failure("--try: the screen does not open any more")
+    say("Move the mouse over the bone: the drill rests where the pointer is.\n"
+        "Hold the left button to drill. The wheel sets how hard you push; the right button turns the drill.\n"
+        "Close the window, or press Ctrl-C here, to end. The window's start page offers what you cut again.")
+    # In its own process session, so that Ctrl-C reaches it only once, through this process.
+    window = subprocess.Popen(["setpriv", "--pdeathsig", "TERM", programs / "osteon", case, "--tool", FIRST_TOOL],
+                              stdin=subprocess.DEVNULL, start_new_session=True)
+    try:
+        code = window.wait()
+    except KeyboardInterrupt:
+        window.terminate()
+        window.wait()
+        raise
+    if code != 0:
+        raise Failure(f"the window ended with {code}" if code > 0 else
+                      f"the window was ended by {signal.Signals(-code).name}")
+    return 0
+
+
 def run(options, programs, out):
     """The demo, in a folder of its own. Exit code 1: somebody held another bone at the end."""
     started = time.monotonic()
+    case = chosen_case(options, programs)
     if options.bone:
-        case = phantom_case(options.bone, programs)
         together_at = plans.on_phantom(case_info(programs, case), options.bone)
         alone_at = together_at[:1]
     elif options.case:
-        case = prepare_case(options.case.resolve(), programs, [])
         together_at = plans.from_two_sides(*plans.ANY_SIDE[1:3])
         alone_at = [plans.toward(side) for side in plans.ANY_SIDE]
     else:
-        case = prepare_case(example_skull().resolve(), programs, ["--title", "Human skull"])
         together_at = plans.from_two_sides(plans.LEFT_PARIETAL, plans.RIGHT_PARIETAL)
         alone_at = together_at[:1]
     empty(out)
     if options.together:
-        return together.run(programs, case, together_at, out, say, DEVICE, case_title(programs, case))
-    numbers = run_on_some_side(programs, case, alone_at, out)
+        return together.run(programs, case, together_at, out, say, DEVICE, case_title(programs, case),
+                            options.window)
+    numbers = run_on_some_side(programs, case, alone_at, out, options.window)
     say("Writing the report")
     session = record.read_table(out / "session.csv")
     plots.force_and_depth(session, out / "force_depth.png")
@@ -168,14 +201,18 @@ def main():
     parser = argparse.ArgumentParser(prog="deploy/demo")
     parser.add_argument("--case", type=Path)
     parser.add_argument("--bone")
-    parser.add_argument("--out", type=Path, required=True)
+    parser.add_argument("--out", type=Path)
     parser.add_argument("--build", type=Path, required=True)
     parser.add_argument("--together", action="store_true")
+    parser.add_argument("--window", action="store_true", help="the window osteon shows the work")
+    parser.add_argument("--try", action="store_true", dest="by_hand", help="the window osteon for the user's own hand")
     options = parser.parse_args()
     signal.signal(signal.SIGTERM, end_politely)
     programs = options.build / "bin"
-    out = options.out.resolve()
+    out = options.out.resolve() if options.out else None
     try:
+        if options.by_hand:
+            return try_it(options, programs)
         with own_folder(out):
             return run(options, programs, out)
     except Failure as failure:

@@ -1,6 +1,5 @@
 """Runs the programs of a session as child processes: starts and watches them, ends them by id, keeps their logs."""
 import collections
-import ctypes
 import os
 import queue
 import signal
@@ -141,36 +140,6 @@ class Household:
                 raise Failure(f"{what} was not ready within {patience_s:.0f} s")
             time.sleep(0.02)
         return file.read_text().strip()
-
-
-def start_screen(household: Household, size="1280x720"):
-    """The environment to draw in and its name: the caller's display, or a virtual one of this session."""
-    environment = dict(os.environ)
-    if environment.get("DISPLAY") and display_opens():
-        return environment, "a window on your display"
-    xvfb = household.start("Xvfb", ["Xvfb", "-displayfd", "1", "-screen", "0", f"{size}x24", "-nolisten", "tcp",
-                                    "-noreset"])
-    number = xvfb.next_line(20.0)
-    if not number:
-        raise Failure("Xvfb, the virtual screen, did not start; its last lines:", xvfb.last_words())
-    for name in ("WAYLAND_DISPLAY", "XAUTHORITY"):
-        environment.pop(name, None)
-    environment.update(DISPLAY=f":{number.strip()}", LIBGL_ALWAYS_SOFTWARE="1")
-    return environment, "a virtual screen, since no display opens"
-
-
-def display_opens():
-    """Whether the display in DISPLAY accepts us. It may be stale, or refuse."""
-    try:
-        x11 = ctypes.CDLL("libX11.so.6")
-    except OSError:
-        return False
-    x11.XOpenDisplay.restype = ctypes.c_void_p
-    x11.XCloseDisplay.argtypes = [ctypes.c_void_p]
-    display = x11.XOpenDisplay(None)
-    if display:
-        x11.XCloseDisplay(display)
-    return bool(display)
 
 
 def has_sound_server():

@@ -8,7 +8,8 @@ import numpy as np
 
 import plans
 import record
-from processes import Failure, Household, has_sound_server, start_screen
+from processes import Failure, Household, has_sound_server
+from screen import Watcher, start_screen
 
 ROOT = Path(__file__).resolve().parents[2]
 SURFACE_PATIENCE_S = 120.0
@@ -46,12 +47,14 @@ class Viewer:
 
 
 class Session:
-    """One session. `say` gets its live status. Results are in `out`."""
+    """One session. `say` gets its live status. Results are in `out`. With `window` the window `osteon` on the caller's
+    display shows the work, and the pictures come from a virtual screen."""
 
     def __init__(self, programs: Path, case: Path, plan, out: Path, say=print, pictures=True, late_viewer=False,
-                 device="simulated", size="1280x720"):
+                 device="simulated", size="1280x720", window=False):
         self.programs, self.case, self.plan, self.out, self.say = programs, case, plan, out, say
         self.pictures, self.late_viewer, self.device, self.size = pictures, late_viewer, device, size
+        self.window = window
         self.started = time.monotonic()
         self.info = case_info(programs, case)
 
@@ -62,11 +65,12 @@ class Session:
         plan_file.write_text(json.dumps(self.plan, indent=2) + "\n", encoding="utf-8")
         with Household(self.out / "logs") as household:
             self.household = household
-            self.screen, self.picture = start_screen(household, self.size)
+            self.screen, self.picture = start_screen(household, self.size, virtual=self.window)
             self.say(f"Picture: {self.picture}.")
             address = self._start_server()
             viewer = self._start_viewer(address, "osteon-viewer", "--frame-log", self.out / "frames.csv",
                                         "--summary", self.out / "viewer.json")
+            self.watcher = Watcher(household, self.programs, address, ["--plain"], self.say, self.window)
             self._start_audio(address)
             viewer.wait_for_surface()
             if self.pictures:
@@ -143,6 +147,7 @@ class Session:
         cutting_lines, photographed = 0, False
         while haptic.exit_code is None:
             self.household.check()
+            self.watcher.check()
             lines = haptic.new_lines()
             for line in lines:
                 self.say(f"{time.monotonic() - self.started:5.0f} s  {line}")
@@ -176,12 +181,14 @@ class Session:
         viewer.do(f"screenshot {self.out / 'after.png'}")
 
     def _end_all(self):
-        """Ends the programs, clients first. Each must end with exit code 0."""
+        """Ends the programs, clients first. Each must end with exit code 0. The window needs the server to its end."""
         codes = {}
         order = ("osteon-haptic", "late viewer", "osteon-viewer", "osteon-audio", "osteon-server")
         children = {child.name: child for child in self.household.children}
         for name in (name for name in order if name in children):
             child = children[name]
+            if name == "osteon-server":
+                self.watcher.wait_until_closed()
             codes[name] = child.wait(20.0) if child.may_end else None
             if codes[name] is None:
                 codes[name] = child.end()

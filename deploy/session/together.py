@@ -14,13 +14,15 @@ import plans
 import plots
 import record
 import report
-from processes import Failure, Household, start_screen
+from processes import Failure, Household
+from screen import Watcher, start_screen
 from session import ROOT, Viewer, case_info, check_journal, look_at_all, unit
 
 ROOM = "theatre"
 TRAINEES = {"anna": "trainee", "ben": "trainee"}
 INSTRUCTOR = "berg"
 OBSERVER = "class"
+GUEST = "guest"  # at the window
 # Largest growth of the device's force in a millisecond without motion of the hand, and the stiffest coupling.
 SLEW_N_PER_MS = 0.5
 COUPLING_N_PER_MM = 50.0
@@ -100,9 +102,11 @@ class Certificates:
 class Together:
     """`entries` are those of the two trainees and of the instructor."""
 
-    def __init__(self, programs: Path, case: Path, entries, out: Path, say, device, size="1280x720"):
+    def __init__(self, programs: Path, case: Path, entries, out: Path, say, device, size="1280x720",
+                 window=False):
         self.programs, self.case, self.out, self.say, self.device, self.size = programs, case, out, say, device, size
         self.entries = dict(zip((*TRAINEES, INSTRUCTOR), entries))
+        self.window = window
         self.started = time.monotonic()
         self.info = case_info(programs, case)
 
@@ -111,7 +115,7 @@ class Together:
         self.certificates = Certificates(self.programs, self.out)
         with Household(self.out / "logs") as household:
             self.household = household
-            screen, self.picture = start_screen(household, self.size)
+            screen, self.picture = start_screen(household, self.size, virtual=self.window)
             self.say(f"Picture: {self.picture}.")
             address = self._start_server()
             berg = self.certificates.person(INSTRUCTOR, "instructor")
@@ -122,6 +126,7 @@ class Together:
             console = Console(household, household.start("console", [
                 self.programs / "osteon-viewer", "--console", "--server", address, *berg,
                 "--name", "Dr. Berg", "--room", ROOM], takes_input=True), self.say)
+            self.watcher = self._start_window(address)
             viewer.wait_for_surface()
             viewer.do(self._from_side(0.0))
             viewer.do(f"screenshot {self.out / 'before.png'}")
@@ -149,6 +154,11 @@ class Together:
         self.say(f"Server: {self.case.name} at {address}, by mutual TLS.")
         return address
 
+    def _start_window(self, address):
+        guest = self.certificates.person(GUEST, "observer") if self.window else []
+        return Watcher(self.household, self.programs, address, [*guest, "--name", "A guest", "--room", ROOM], self.say,
+                       self.window)
+
     def _start_hand(self, address, name, credentials, plan):
         (self.out / f"{name}-plan.json").write_text(json.dumps(plan, indent=2) + "\n", encoding="utf-8")
         cache = ROOT / "build" / "case-cache"
@@ -171,6 +181,7 @@ class Together:
         deadline = time.monotonic() + patience_s
         while not holds():
             self.household.check()
+            self.watcher.check()
             if time.monotonic() > deadline:
                 raise Failure(f"{what} did not happen within {patience_s:.0f} s")
             time.sleep(0.2)
@@ -225,6 +236,8 @@ class Together:
         codes = {}
         for name in ("anna", "ben", "berg", "console", "osteon-viewer", "osteon-server"):
             child = self._child(name)
+            if name == "osteon-server":
+                self.watcher.wait_until_closed()
             codes[name] = child.wait(20.0) if child.may_end else None
             if codes[name] is None:
                 codes[name] = child.end()
@@ -435,8 +448,8 @@ raise it faster.</p>
     (out / "report.html").write_text(page, encoding="utf-8")
 
 
-def run(programs, case, entries, out, say, device, title):
-    numbers = Together(programs, case, entries, out, say, device).run()
+def run(programs, case, entries, out, say, device, title, window):
+    numbers = Together(programs, case, entries, out, say, device, window=window).run()
     say("Writing the report")
     write_report(out, numbers, title)
     for at, who, what in numbers["events"]["events"]:

@@ -16,6 +16,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 ROOT = Path(os.environ["OSTEON_SOURCE_DIR"])
+BIN = Path(os.environ["OSTEON_BIN"])
 sys.path[:0] = [str(ROOT / "deploy"), str(ROOT / "deploy/session")]
 
 import components  # noqa: E402  (found through the path above)
@@ -36,6 +37,7 @@ project(nothing LANGUAGES NONE)
 add_custom_target(built ALL COMMAND ${CMAKE_COMMAND} -E touch ${CMAKE_SOURCE_DIR}/built)
 """
 NOBODY = 65534
+NO_SCREEN = "--try needs a screen, and no display opens; start it in a terminal of a desktop"
 
 
 def ended(command, **options):
@@ -374,8 +376,12 @@ class DemoOfAPhantom(unittest.TestCase):
                 (["--bone", "patella", "--together"], "--together: a patella has no room for two surgeons; "
                                                       "take another bone"),
                 (["--bone", "femur", "--case", "/"], "--case and --bone both name a bone; give one of them"),
-                (["--bone"], "--bone needs a value")):
-            tried = ended([ROOT / "deploy/demo", *wrong])
+                (["--bone"], "--bone needs a value"),
+                (["--try", "--together"], "--try is for your own hand, and --together for simulated ones; "
+                                          "give one of them"),
+                (["--try", "--out", "folder"], "--try writes no report; leave --out away"),
+                (["--try", "--bone", "femur"], NO_SCREEN)):
+            tried = ended([ROOT / "deploy/demo", *wrong], env=without_display())
             self.assertNotEqual(tried.returncode, 0)
             self.assertEqual((tried.stdout, tried.stderr), ("", f"deploy/demo: {sentence}\n"))
 
@@ -394,6 +400,133 @@ class DemoOfAPhantom(unittest.TestCase):
             self.assertNotEqual(demo.phantom_case("tibia", folder / "bin"), first)
             self.assertEqual((folder / "bin/osteon-import.runs").read_text(encoding="utf-8"),
                              "phantom femur --out\nphantom tibia --out\n")
+
+
+def without_display():
+    return {name: value for name, value in os.environ.items() if name not in ("DISPLAY", "WAYLAND_DISPLAY")}
+
+
+class DemoOnAScreen(unittest.TestCase):
+    """deploy/demo in a checkout whose build takes no time. It writes down what it was to build."""
+
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.checkout = Path(folder.name)
+        self.bin = self.checkout / "build/dev/bin"
+        self.bin.parent.mkdir(parents=True)
+        (self.checkout / "deploy").mkdir()
+        for name in ("demo", "environment.sh"):
+            shutil.copy(ROOT / "deploy" / name, self.checkout / "deploy")
+        shutil.copytree(ROOT / "deploy/session", self.checkout / "deploy/session")
+        self.program(self.checkout / "deploy/install", "exit 0")
+        self.program(self.checkout / "deploy/build", 'echo "$*" >"$(dirname "$0")/built"')
+        self.environment = without_display()
+        for name in ("XDG_DATA_HOME", "XDG_CONFIG_HOME", "XDG_RUNTIME_DIR"):
+            (self.checkout / name).mkdir(mode=0o700)
+            self.environment[name] = str(self.checkout / name)
+
+    @staticmethod
+    def program(file, text):
+        file.write_text(f"#!/bin/sh\n{text}\n", encoding="utf-8")
+        file.chmod(0o755)
+
+    def fake_programs(self, window):
+        self.bin.mkdir()
+        self.program(self.bin / "osteon-import", 'mkdir "$4"\n: >"$4/case.json"')
+        self.program(self.bin / "osteon", f'echo "$*" >"$0.told"\n{window}')
+
+    def open_screen(self):
+        screen = subprocess.Popen(["Xvfb", "-displayfd", "1", "-screen", "0", "1280x900x24", "-nolisten", "tcp"],
+                                  stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
+                                  text=True)
+        self.addCleanup(screen.stdout.close)
+        self.addCleanup(screen.wait)
+        self.addCleanup(screen.terminate)
+        self.environment.update(DISPLAY=f":{screen.stdout.readline().strip()}", LIBGL_ALWAYS_SOFTWARE="1")
+
+    def demo(self, *options):
+        return ended([self.checkout / "deploy/demo", *options], env=self.environment)
+
+    def built(self):
+        return (self.checkout / "deploy/built").read_text(encoding="utf-8").split()
+
+    def start(self, *options):
+        running = subprocess.Popen([self.checkout / "deploy/demo", *options], env=self.environment,
+                                   stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+                                   text=True, preexec_fn=hear_interrupts)
+        self.addCleanup(running.stdout.close)
+        self.addCleanup(running.wait)
+        self.addCleanup(running.kill)
+        return running
+
+    def test_a_stale_display_is_one_sentence_before_the_build(self):
+        self.environment["DISPLAY"] = ":987654"
+        tried = self.demo("--try", "--bone", "femur")
+        self.assertNotEqual(tried.returncode, 0)
+        self.assertEqual((tried.stdout, tried.stderr), ("", f"deploy/demo: {NO_SCREEN}\n"))
+        self.assertFalse((self.checkout / "deploy/built").exists())
+
+    def test_builds_the_window_only_where_a_screen_can_show_it(self):
+        self.fake_programs("exit 0")
+        self.program(self.bin / "osteon-import", "echo no such bone >&2; exit 1")
+        self.assertEqual(self.demo("--bone", "femur").returncode, 1)
+        self.assertEqual(set(self.built()),
+                         {"dev", "osteon-import", "osteon-server", "osteon-haptic", "osteon-audio", "osteon-viewer"})
+        self.open_screen()
+        self.assertEqual(self.demo("--bone", "femur").returncode, 1)
+        self.assertIn("osteon", self.built())
+        self.demo("--bone", "femur", "--try")
+        self.assertEqual(set(self.built()),
+                         {"dev", "osteon-import", "osteon-server", "osteon-haptic", "osteon-audio", "osteon"})
+
+    def test_the_window_gets_the_bone_and_the_drill_and_closing_it_ends_the_demo(self):
+        self.fake_programs("exit 0")
+        self.open_screen()
+        tried = self.demo("--bone", "femur", "--try")
+        self.assertEqual((tried.returncode, tried.stderr), (0, ""))
+        case, *how = (self.bin / "osteon.told").read_text(encoding="utf-8").split()
+        self.assertTrue((Path(case) / "case.json").exists())
+        self.assertEqual(how, ["--tool", "drill-3.2"])
+        self.assertRegex(tried.stdout, r"\nMove the mouse .*\nHold the left button .*\nClose the window.*\n\Z")
+        self.assertFalse((self.checkout / "out").exists())
+
+    def test_a_window_that_fails_is_one_sentence(self):
+        self.fake_programs("exit 3")
+        self.open_screen()
+        tried = self.demo("--bone", "femur", "--try")
+        self.assertEqual((tried.returncode, tried.stderr), (1, "deploy/demo: the window ended with 3\n"))
+
+    def test_an_interrupt_ends_the_real_window_and_its_children(self):
+        self.bin.symlink_to(BIN)
+        case = self.checkout / "block"
+        made = ended([BIN / "osteon-import", "phantom", "block", "--layers", "5:1.9,20:0.3,5:1.9", "--width", "40",
+                      "--pitch", "0.5", "--out", case])
+        self.assertEqual(made.returncode, 0, made.stderr)
+        self.open_screen()
+        running = self.start("--try", "--case", case)
+        deadline = time.monotonic() + 120
+        while not {"osteon", "osteon-server", "osteon-haptic"} <= set(programs_of(self.checkout).values()):
+            self.assertIsNone(running.poll(), "it ended before its window was open")
+            self.assertLess(time.monotonic(), deadline, str(programs_of(self.checkout)))
+            time.sleep(0.05)
+        started = programs_of(self.checkout)
+        running.send_signal(signal.SIGINT)
+        self.assertEqual(running.wait(60), 130)
+        self.assertTrue(running.stdout.read().endswith("deploy/demo: stopped; every program has been ended\n"))
+        self.assertEqual([name for process, name in started.items() if not ends(process)], [])
+
+
+def programs_of(checkout):
+    """The programs that run with this checkout's folder of data, by process id."""
+    found = {}
+    for folder in Path("/proc").glob("[0-9]*"):
+        try:
+            if f"XDG_DATA_HOME={checkout}/".encode() in (folder / "environ").read_bytes():
+                found[int(folder.name)] = Path(os.readlink(folder / "exe")).name
+        except OSError:
+            pass  # it has ended
+    return found
 
 
 class TwoDemos(unittest.TestCase):

@@ -4,6 +4,7 @@
 #include <signal.h>
 
 #include <QVTKOpenGLNativeWidget.h>
+#include <QAction>
 #include <QApplication>
 #include <QCheckBox>
 #include <QComboBox>
@@ -24,6 +25,7 @@
 #include <QUrl>
 #include <QWheelEvent>
 #include <QWindow>
+#include <algorithm>
 #include <chrono>
 #include <fstream>
 #include <memory>
@@ -433,6 +435,82 @@ TEST_F(WindowTest, AFileThatIsNoCaseIsRefusedWithASentence) {
   ASSERT_TRUE(until([&] { return label("words").contains("picture.osteon is not"); })) << problem();
   EXPECT_FALSE(label("words").contains("\n"));
   EXPECT_TRUE(window_->findChild<QListWidget*>("examples")->isEnabled());
+}
+
+TEST_F(WindowTest, TheToolOfTheCommandLineIsInTheHandAtOnce) {
+  window_->hold_first("burr-round-5");
+  open();
+  EXPECT_TRUE(view_->holding());
+  EXPECT_TRUE(view_->pointer().spindle());
+  hover(middle());
+  EXPECT_TRUE(until([&] {
+    const auto states = view_->updater()->states();
+    return !states.empty() && states.front().tool_name == "burr-round-5";
+  })) << problem();
+  // It is for the first room only.
+  window_->practise(desk_->bone());
+  ASSERT_TRUE(until([&] { return view_->surface_shown(); })) << problem();
+  EXPECT_FALSE(view_->holding());
+}
+
+TEST_F(WindowTest, AWindowThatWatchesFollowsTheToolAndChangesNothing) {
+  open();
+  MainWindow other;
+  other.show();
+  auto* seen = other.findChild<BoneView*>("bone");
+  QString address = label("connection");
+  ASSERT_TRUE(until([&] {
+    address = label("connection").section(' ', -1);
+    return address.contains(':');
+  }));
+  other.watch({address, {}, {}, {}});
+  ASSERT_TRUE(until([&] { return seen->surface_shown(); })) << problem();
+
+  // No tool, no item and no undo, whatever is chosen.
+  for (const char* name : {"undo", "redo", "mark", "put_down", "spindle"})
+    EXPECT_FALSE(other.findChild<QAction*>(name)->isEnabled()) << name;
+  EXPECT_TRUE(other.findChild<QAction*>("look_tool")->isEnabled());
+  EXPECT_FALSE(other.findChild<QToolButton*>("drill")->isEnabled());
+  for (const char* name : {"drill", "pin"}) other.findChild<QToolButton*>(name)->defaultAction()->trigger();
+  EXPECT_FALSE(seen->holding());
+  EXPECT_FALSE(seen->placing());
+
+  // It sees the hole, and its camera is at the tool.
+  drill();
+  const auto off_tool_mm = [&] {
+    const auto states = seen->updater()->states();
+    return states.empty() ? 1e9 : (seen->camera().target_mm - states.front().pose_bone_tool.position_mm).norm();
+  };
+  EXPECT_TRUE(until([&] { return seen->updater()->surface().any_cut_face() && off_tool_mm() < 25.0; })) << problem();
+  // A drag frees the camera. It stays where the user put it, until T.
+  QTest::mouseRelease(view_, Qt::LeftButton, {}, middle());
+  other.findChild<QAction*>("overview")->trigger();
+  const CameraView free = seen->camera();
+  for (int step = 0; step < 5; ++step) {
+    hover(middle() + QPoint(10 * step, 0));
+    QTest::qWait(100);
+  }
+  EXPECT_EQ(seen->camera().eye_mm, free.eye_mm);
+  other.findChild<QAction*>("look_tool")->trigger();
+  EXPECT_TRUE(until([&] { return off_tool_mm() < 25.0; }));
+  EXPECT_NE(seen->camera().eye_mm, free.eye_mm);
+}
+
+TEST(WindowProgram, RefusesWrongOptionsWithOneSentence) {
+  struct Wrong {
+    std::vector<std::string> options;
+    std::string says;
+  };
+  const Wrong all[] = {{{"--watch"}, "--server"},
+                       {{"--tool", "drill-3.2"}, "--tool needs a bone: give CASE or --example"},
+                       {{"--example", "femur", "--tool", "hammer"}, "--tool hammer: there is no such tool"},
+                       {{"--example", "femur", "--tool", "screw-1"}, "--tool screw-1: there is no such tool"}};
+  for (const Wrong& wrong : all) {
+    const auto tried = test::run(test::program("osteon"), wrong.options);
+    EXPECT_NE(tried.exit_code, 0);
+    EXPECT_NE(tried.err.find(wrong.says), std::string::npos) << tried.err;
+    EXPECT_EQ(std::count(tried.err.begin(), tried.err.end(), '\n'), 1) << tried.err;
+  }
 }
 
 TEST_F(WindowTest, ABoneThatIsNoneIsRefusedWithASentence) {

@@ -18,6 +18,8 @@ constexpr double kRadPerPixel = 0.008, kZoomPerNotch = 0.85, kNewtonsPerNotch = 
 constexpr std::chrono::milliseconds kFrame{16};
 constexpr int kClick_px = 4;  // a longer way is a drag
 constexpr double kToolDistance_mm = 120.0;
+// A camera that went after each motion of the tool would make the bone tremble.
+constexpr double kFollowed_mm = 20.0;
 
 }  // namespace
 
@@ -50,6 +52,7 @@ void BoneView::show_room(RenderQueue* queue, const Box& bounds) {
   bounds_ = bounds;
   if (queue != nullptr) updater_.emplace(*queue, *scene_);
   look_overview();
+  following_ = follows_;
   redraw();
 }
 
@@ -85,6 +88,7 @@ void BoneView::draw() {
   drawing_ = true;
   const auto begin = std::chrono::steady_clock::now();
   if (updater_) scene_->show_tools(updater_->states());
+  follow_tool();
   QString notice = notice_;
   if (updater_)
     if (const auto percent = updater_->percent_received()) notice = tr("Receiving the surface, %1 %").arg(*percent);
@@ -100,6 +104,7 @@ void BoneView::draw() {
 }
 
 void BoneView::look(const CameraView& view) {
+  following_ = false;
   scene_->look(view);
   camera_moved();
 }
@@ -119,6 +124,17 @@ void BoneView::look_from(const Vec3& side) {
 void BoneView::look_tool() {
   if (updater_ && !updater_->states().empty())
     look(beside_tool(updater_->states().front().pose_bone_tool, kToolDistance_mm));
+  following_ = follows_;
+}
+
+void BoneView::set_following(bool on) { follows_ = following_ = on; }
+
+void BoneView::follow_tool() {
+  if (!following_ || !updater_ || updater_->states().empty()) return;
+  const Pose& tool = updater_->states().front().pose_bone_tool;
+  const CameraView now = camera();
+  const bool near = (now.target_mm - tool.position_mm).norm() <= kFollowed_mm;
+  if (!near || (now.eye_mm - now.target_mm).norm() > 1.01 * kToolDistance_mm) look_tool();
 }
 
 void BoneView::set_notice(const QString& notice) {

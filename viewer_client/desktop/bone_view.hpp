@@ -53,6 +53,10 @@ class BoneView : public QVTKOpenGLNativeWidget {
   // From a direction: the eye lies that way from the middle of the bone.
   void look_from(const Vec3& side);
   void look_tool();
+  // The camera goes after the first tool, until look() or the mouse moves it. look_tool() sends it after the tool
+  // again.
+  void set_following(bool on);
+  [[nodiscard]] bool following() const { return following_; }
   void set_notice(const QString& notice);
   // How the bone is drawn. It holds for the rooms that follow too.
   void show_marker(bool on);
@@ -85,6 +89,7 @@ class BoneView : public QVTKOpenGLNativeWidget {
   [[nodiscard]] SightRay sight(const QPoint& at) const;
   void turn_camera(const QPoint& by, Qt::KeyboardModifiers keys);
   void camera_moved();
+  void follow_tool();
   void pointer_moved();
 
   Events events_;
@@ -93,8 +98,10 @@ class BoneView : public QVTKOpenGLNativeWidget {
   Box bounds_;
   ToolPointer pointer_;
   bool holding_ = false, placing_ = false;
-  QPoint last_;     // position of the mouse, device pixels
-  QPoint pressed_;  // where a button went down
+  bool follows_ = false;    // the camera is one that goes after the tool
+  bool following_ = false;  // it does so now
+  QPoint last_;             // position of the mouse, device pixels
+  QPoint pressed_;          // where a button went down
   bool camera_drag_ = false;
   QString notice_;
   bool marker_ = false;

@@ -22,26 +22,47 @@ constexpr const char* kProgram = "osteon";
 constexpr int kStopPeriod_ms = 100;
 
 struct Arguments {
-  std::string bone, example, server, room, name;
+  std::string bone, example, tool, server, room, name;
+  bool watch = false;
   wire::CredentialArguments credentials;
 };
+
+void add_options(CLI::App& app, Arguments& arguments) {
+  app.add_option("CASE", arguments.bone, "Case to open: an .osteon file, or a folder as osteon-import writes it");
+  app.add_option("--example", arguments.example,
+                 "Opens a bone that comes with Osteon: skull, femur, tibia, patella, "
+                 "knee, hip or pelvis");
+  app.add_option("--tool", arguments.tool,
+                 "The tool that the hand holds at once, with CASE or --example; osteon-import tools names them");
+  auto* server = app.add_option("--server", arguments.server, "Joins a room instead: HOST:PORT of osteon-server");
+  app.add_flag("--watch", arguments.watch, "Only watches that room: the view follows the work, no tool can be taken")
+      ->needs(server);
+  app.add_option("--room", arguments.room, "Name of the room; not needed where the server has one");
+  app.add_option("--name", arguments.name, "Who you are, shown to others");
+  wire::add_credential_options(app, arguments.credentials);
+}
+
+// Errors: invalid_input (--tool without a bone), not_found (no hand can hold such a tool).
+Result<void> check_tool(const Arguments& arguments) {
+  if (arguments.tool.empty()) return {};
+  if (arguments.bone.empty() && arguments.example.empty())
+    return failure(ErrorCode::invalid_input, "--tool needs a bone: give CASE or --example");
+  if (MainWindow::can_hold(arguments.tool)) return {};
+  return failure(ErrorCode::not_found, "--tool " + arguments.tool +
+                                           ": there is no such tool that a hand holds; osteon-import tools "
+                                           "names them");
+}
 
 }  // namespace
 
 int main(int argc, char** argv) {
   Arguments arguments;
   CLI::App app{"Practise bone surgery in a window: open a bone, take a tool with the mouse, and cut.", kProgram};
-  app.add_option("CASE", arguments.bone, "Case to open: an .osteon file, or a folder as osteon-import writes it");
-  app.add_option("--example", arguments.example,
-                 "Opens a bone that comes with Osteon: skull, femur, tibia, patella, "
-                 "knee, hip or pelvis");
-  app.add_option("--server", arguments.server, "Joins a room instead: HOST:PORT of osteon-server");
-  app.add_option("--room", arguments.room, "Name of the room; not needed where the server has one");
-  app.add_option("--name", arguments.name, "Who you are, shown to others");
-  wire::add_credential_options(app, arguments.credentials);
+  add_options(app, arguments);
   if (const auto code = parse_arguments(app, argc, argv)) return *code;
   log::open(kProgram);
   const StopSignal stop;
+  if (const auto held = check_tool(arguments); !held) return log::exit_with(kProgram, held.error());
 
   if (qEnvironmentVariableIsEmpty("DISPLAY") && qEnvironmentVariableIsEmpty("QT_QPA_PLATFORM"))
     return log::exit_with(
@@ -58,6 +79,7 @@ int main(int argc, char** argv) {
   if (translator.load(QLocale(), "osteon", "_", ":/translations")) QApplication::installTranslator(&translator);
 
   MainWindow window;
+  window.hold_first(arguments.tool);
   window.show();
   // A signal closes the window, which ends its children in order.
   QTimer stopping;
@@ -70,8 +92,9 @@ int main(int argc, char** argv) {
   if (!arguments.server.empty()) {
     const auto credentials = wire::client_credentials(arguments.credentials);
     if (!credentials) return log::exit_with(kProgram, credentials.error());
-    window.join({QString::fromStdString(arguments.server), QString::fromStdString(arguments.room),
-                 QString::fromStdString(arguments.name), *credentials});
+    const RoomAddress room{QString::fromStdString(arguments.server), QString::fromStdString(arguments.room),
+                           QString::fromStdString(arguments.name), *credentials};
+    arguments.watch ? window.watch(room) : window.join(room);
   } else if (!arguments.bone.empty()) {
     if (is_case(arguments.bone)) {
       window.practise(arguments.bone);

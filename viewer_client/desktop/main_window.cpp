@@ -46,10 +46,8 @@ constexpr int kPointerPeriod_ms = 50;
 constexpr int kMessage_ms = 8000;
 constexpr const char* kFirstTool = "drill-3.2";
 
-bool is_held(const std::string& name) {
-  const Result<Tool> tool = find_tool(name);
-  return tool && tool->cuts() && tool->kind != ToolKind::pin && tool->kind != ToolKind::screw;
-}
+// What changes the room, beside the tools.
+constexpr const char* kWorkActions[] = {"undo", "redo", "mark", "put_down", "spindle"};
 
 // The first file or folder that somebody drags over the window. Empty: none on this computer.
 std::filesystem::path dragged_path(const QMimeData& data) {
@@ -59,6 +57,11 @@ std::filesystem::path dragged_path(const QMimeData& data) {
 }
 
 }  // namespace
+
+bool MainWindow::can_hold(const std::string& name) {
+  const Result<Tool> tool = find_tool(name);
+  return tool && tool->cuts() && tool->kind != ToolKind::pin && tool->kind != ToolKind::screw;
+}
 
 MainWindow::MainWindow() {
   setWindowTitle("Osteon");
@@ -265,8 +268,10 @@ void MainWindow::make_status() {
 
 void MainWindow::enable_room_actions(bool on) {
   for (QAction* action : room_actions_) action->setEnabled(on);
-  tools_->setEnabled(on);
+  tools_->setEnabled(on && !watching_);
   for (QDockWidget* panel : findChildren<QDockWidget*>()) panel->setEnabled(on);
+  if (watching_)
+    for (const char* name : kWorkActions) findChild<QAction*>(name)->setEnabled(false);
 }
 
 void MainWindow::say(const QString& sentence) { statusBar()->showMessage(sentence, kMessage_ms); }
@@ -415,7 +420,7 @@ void MainWindow::practise(const std::filesystem::path& bone, const std::filesyst
   options.bone = bone;
   options.folder = session.empty() ? new_session_folder(bone) : session;
   options.cache = data_folder() / "cache";
-  options.tool = kFirstTool;
+  options.tool = first_tool_.empty() ? kFirstTool : QString::fromStdString(first_tool_);
   options.sound = sound_->isChecked();
   QDir().mkpath(text_of(options.cache));
 
@@ -465,6 +470,21 @@ void MainWindow::join(const RoomAddress& room) {
                        [this](const Error& error) { room_ended(QString::fromStdString(error.message)); }});
 }
 
+void MainWindow::watch(const RoomAddress& room) {
+  leave_room();
+  join(room);
+  set_watching(true);
+}
+
+void MainWindow::hold_first(const std::string& tool) {
+  if (can_hold(tool)) first_tool_ = tool;
+}
+
+void MainWindow::set_watching(bool on) {
+  watching_ = on;
+  view_->set_following(on);
+}
+
 void MainWindow::show_joined(const WatchedRoom& room) {
   view_->show_room(&room_->queue(), room.bounds);
   clipping_->reset(room.bounds);
@@ -479,7 +499,9 @@ void MainWindow::show_joined(const WatchedRoom& room) {
   if (pointer_) pointer_timer_.start(kPointerPeriod_ms);
   if (opened_) remember(*opened_);
   view_->setFocus();
+  if (watching_) return say(tr("You watch. The view follows the tool; a drag turns the bone, T follows again."));
   say(tr("Choose a tool on the left, then hold the left button on the bone."));
+  if (practice_ && !first_tool_.empty()) take_tool(std::exchange(first_tool_, {}));
 }
 
 void MainWindow::leave_room() {
@@ -492,6 +514,7 @@ void MainWindow::leave_room() {
   practice_.reset();
   pointer_.reset();
   opened_.reset();
+  set_watching(false);
   enable_room_actions(false);
   setWindowTitle("Osteon");
   for (QLabel* label : {device_, position_, connection_}) label->clear();
@@ -508,10 +531,10 @@ void MainWindow::room_ended(const QString& sentence) {
 }
 
 void MainWindow::take_tool(const std::string& tool) {
-  if (!room_) return;
+  if (!room_ || watching_) return tools_->show_held({});
   properties_->show_tool(tool);
   tools_->show_held(tool);
-  if (is_held(tool) && pointer_) {
+  if (can_hold(tool) && pointer_) {
     placing_.clear();
     view_->pointer().take(tool);
     view_->set_holding(true);

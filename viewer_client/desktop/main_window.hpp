@@ -53,6 +53,12 @@ class MainWindow : public QMainWindow {
   void save_case_file(const QString& file);
   void open_example(const ExampleBone& bone);
   void join(const RoomAddress& room);
+  // Joins, but only to look: no tool can be taken, and nothing be placed or undone. The view follows the work.
+  void watch(const RoomAddress& room);
+  // The tool that the hand holds as soon as a room to practise in is open. A tool that can_hold() refuses is ignored.
+  void hold_first(const std::string& tool);
+  // Whether a hand can hold a tool of this name.
+  [[nodiscard]] static bool can_hold(const std::string& tool);
   void import_scan(const QString& source);
 
  protected:
@@ -98,6 +104,7 @@ class MainWindow : public QMainWindow {
   void refresh_gauges();
   void say(const QString& sentence);
   void enable_room_actions(bool on);
+  void set_watching(bool on);
 
   QStackedWidget* pages_ = nullptr;
   StartPage* start_ = nullptr;
@@ -118,7 +125,9 @@ class MainWindow : public QMainWindow {
   std::unique_ptr<RoomLink> room_;
   std::optional<RecentEntry> opened_;
   std::vector<RoomSeq> undo_points_;  // before each push and each item, oldest first
-  std::string placing_;               // the item that the next click places
+  std::string first_tool_;            // that the hand takes in the next room; empty: none
+  bool watching_ = false;
+  std::string placing_;  // the item that the next click places
   QString address_;
   QTimer gauge_timer_, pointer_timer_;
   QElapsedTimer clock_;
