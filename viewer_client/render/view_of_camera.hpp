@@ -1,27 +1,12 @@
 // CameraView and VTK's camera.
 #pragma once
-#include <vtkCamera.h>
-
-#include <numbers>
-
 #include "viewer_client/scene/camera_view.hpp"
+
+class vtkCamera;
 
 namespace osteon {
 
-inline void set_view(vtkCamera& camera, const CameraView& view) {
-  camera.SetPosition(view.eye_mm.x(), view.eye_mm.y(), view.eye_mm.z());
-  camera.SetFocalPoint(view.target_mm.x(), view.target_mm.y(), view.target_mm.z());
-  camera.SetViewUp(view.up.x(), view.up.y(), view.up.z());
-  camera.SetViewAngle(view.view_angle_rad * 180.0 / std::numbers::pi);
-}
-
-inline CameraView view_of(vtkCamera& camera) {
-  CameraView view;
-  camera.GetPosition(view.eye_mm.data());
-  camera.GetFocalPoint(view.target_mm.data());
-  camera.GetViewUp(view.up.data());
-  view.view_angle_rad = camera.GetViewAngle() * std::numbers::pi / 180.0;
-  return view;
-}
+void set_view(vtkCamera& camera, const CameraView& view);
+[[nodiscard]] CameraView view_of(vtkCamera& camera);
 
 }  // namespace osteon
