@@ -26,9 +26,12 @@
 #include "common/tools/tool.hpp"
 #include "viewer_client/desktop/bone_view.hpp"
 #include "viewer_client/desktop/gauges_panel.hpp"
+#include "viewer_client/desktop/language.hpp"
+#include "viewer_client/desktop/menu_keys.hpp"
 #include "viewer_client/desktop/properties_panel.hpp"
 #include "viewer_client/desktop/start_page.hpp"
 #include "viewer_client/desktop/tool_bar.hpp"
+#include "viewer_client/desktop/tool_names.hpp"
 
 namespace osteon {
 
@@ -175,6 +178,8 @@ void MainWindow::make_view_menu() {
       [this] { isFullScreen() ? showNormal() : showFullScreen(); }, false);
   view->addSeparator();
   for (QDockWidget* panel : findChildren<QDockWidget*>()) view->addAction(panel->toggleViewAction());
+  view->addSeparator();
+  fill_language_menu(*view->addMenu(tr("Lan&guage")), [this](const QString& sentence) { say(sentence); });
 }
 
 void MainWindow::make_tools_menu() {
@@ -222,6 +227,7 @@ void MainWindow::make_actions() {
   make_view_menu();
   make_tools_menu();
   make_help_menu();
+  for (const QAction* menu : menuBar()->actions()) add_menu_keys(*menu->menu());
   QToolBar* upper = addToolBar(tr("Actions"));
   upper->setObjectName("actions");
   for (const char* name :

@@ -10,7 +10,7 @@
 #include <utility>
 
 #include "common/tools/tool.hpp"
-#include "viewer_client/desktop/tool_bar.hpp"
+#include "viewer_client/desktop/tool_names.hpp"
 #include "viewer_client/scene/tool_groups.hpp"
 #include "viewer_client/scene/tool_pointer.hpp"
 
