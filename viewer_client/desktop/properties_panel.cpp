@@ -26,12 +26,14 @@ PropertiesPanel::PropertiesPanel(std::function<void(const Chosen&)> changed,
                                  std::function<void(const std::string&)> resized, QWidget* parent)
     : QWidget(parent), changed_(std::move(changed)), resized_(std::move(resized)) {
   auto* form = new QFormLayout(this);
+  form->setRowWrapPolicy(QFormLayout::WrapLongRows);
   const auto row = [&](const QString& what, const char* name, QWidget* widget) {
     widget->setObjectName(name);
     widget->setAccessibleName(what);
     form->addRow(what, widget);
   };
   size_ = new QComboBox;
+  size_->setSizeAdjustPolicy(QComboBox::AdjustToContents);
   row(tr("Tool"), "size", size_);
   rpm_ = new QSpinBox;
   rpm_->setRange(0, kMostRpm);
