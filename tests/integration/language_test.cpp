@@ -19,6 +19,8 @@
 #include <QSettings>
 #include <QSpinBox>
 #include <QStatusBar>
+#include <QStyle>
+#include <QStyleOptionComboBox>
 #include <QTabBar>
 #include <QTest>
 #include <QToolButton>
@@ -90,8 +92,17 @@ int excess(const QWidget& widget) {
       if (label->isVisible() && !label->text().isEmpty()) right = std::min(right, label->x());
     return bar->fontMetrics().horizontalAdvance(bar->currentMessage()) - right;
   }
-  if (qobject_cast<const QComboBox*>(&widget) != nullptr || qobject_cast<const QAbstractSpinBox*>(&widget) != nullptr ||
-      qobject_cast<const QTabBar*>(&widget) != nullptr)
+  if (const auto* combo = qobject_cast<const QComboBox*>(&widget)) {
+    QStyleOptionComboBox option;
+    option.initFrom(combo);
+    const QRect field =
+        combo->style()->subControlRect(QStyle::CC_ComboBox, &option, QStyle::SC_ComboBoxEditField, combo);
+    int most = 0;
+    for (int i = 0; i < combo->count(); ++i)
+      most = std::max(most, combo->fontMetrics().horizontalAdvance(combo->itemText(i)) - field.width());
+    return most;
+  }
+  if (qobject_cast<const QAbstractSpinBox*>(&widget) != nullptr || qobject_cast<const QTabBar*>(&widget) != nullptr)
     return widget.sizeHint().width() - width;
   const auto* button = qobject_cast<const QAbstractButton*>(&widget);
   if (button != nullptr && !button->text().isEmpty()) return button->sizeHint().width() - width;
@@ -212,7 +223,9 @@ class LanguageTest : public testing::Test {
     }
     return true;
   }
+  // It gets the size and the panels of the window before it, as at a next start.
   void open_window(const char* language) {
+    if (window_) window_->close();
     window_.reset();
     speak(language);
     window_ = std::make_unique<MainWindow>();
@@ -236,10 +249,13 @@ class LanguageTest : public testing::Test {
   // Takes one tool of each group after the other. Returns all texts that were seen.
   [[nodiscard]] std::set<QString> take_tools(const std::string& language) {
     std::set<QString> seen;
+    const auto* view = window_->findChild<BoneView*>("bone");
+    const int width = view->width();
     for (const ToolGroup& group : tool_groups()) {
       auto* button = window_->findChild<QToolButton*>(QString::fromStdString(std::string(group.name)));
       QTest::mouseClick(button, Qt::LeftButton);
-      QTest::qWait(150);  // the panel takes its new width
+      QTest::qWait(150);
+      EXPECT_EQ(view->width(), width) << "a change of the tool moves the picture";
       expect_whole(language + ", " + std::string(group.name));
       seen.merge(texts(*window_));
     }
@@ -335,7 +351,6 @@ TEST_F(LanguageTest, TextsWithoutRoomAreNoticed) {
   wrapped->setWordWrap(true);
   auto* button = new QPushButton("Abbrechen", &window);
   auto* combo = new QComboBox(&window);
-  combo->setSizeAdjustPolicy(QComboBox::AdjustToContents);
   combo->addItem("Zylindrische Außenfräse 46 mm");
   auto* spin = new QSpinBox(&window);
   spin->setSuffix(" U/min");

@@ -26,15 +26,20 @@ PropertiesPanel::PropertiesPanel(std::function<void(const Chosen&)> changed,
                                  std::function<void(const std::string&)> resized, QWidget* parent)
     : QWidget(parent), changed_(std::move(changed)), resized_(std::move(resized)) {
   auto* form = new QFormLayout(this);
-  form->setRowWrapPolicy(QFormLayout::WrapLongRows);
   const auto row = [&](const QString& what, const char* name, QWidget* widget) {
     widget->setObjectName(name);
     widget->setAccessibleName(what);
     form->addRow(what, widget);
   };
   size_ = new QComboBox;
-  size_->setSizeAdjustPolicy(QComboBox::AdjustToContents);
-  row(tr("Tool"), "size", size_);
+  size_->setObjectName("size");
+  size_->setAccessibleName(tr("Tool"));
+  // Wide enough for every tool, so that the panel, and with it the picture beside it, never changes its width.
+  for (const ToolGroup& group : tool_groups())
+    for (const std::string& tool : group.tools) size_->addItem(tool_title(tool));
+  size_->setMinimumWidth(size_->sizeHint().width());
+  size_->clear();
+  form->addRow(size_);
   rpm_ = new QSpinBox;
   rpm_->setRange(0, kMostRpm);
   rpm_->setSingleStep(100);
