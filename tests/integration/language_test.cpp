@@ -249,11 +249,15 @@ class LanguageTest : public testing::Test {
   // Takes one tool of each group after the other. Returns all texts that were seen.
   [[nodiscard]] std::set<QString> take_tools(const std::string& language) {
     std::set<QString> seen;
-    const auto* view = window_->findChild<BoneView*>("bone");
+    auto* view = window_->findChild<BoneView*>("bone");
+    const auto* spindle = window_->findChild<QLabel*>("spindle");
     const int width = view->width();
     for (const ToolGroup& group : tool_groups()) {
       auto* button = window_->findChild<QToolButton*>(QString::fromStdString(std::string(group.name)));
       QTest::mouseClick(button, Qt::LeftButton);
+      QTest::mouseMove(view, view->rect().center() + QPoint(1, 0));
+      QTest::mouseMove(view, view->rect().center());
+      EXPECT_TRUE(until([&] { return spindle->text() != "–"; })) << "the gauges show nothing";
       QTest::qWait(150);
       EXPECT_EQ(view->width(), width) << "a change of the tool moves the picture";
       expect_whole(language + ", " + std::string(group.name));
