@@ -71,6 +71,7 @@ class Help(unittest.TestCase):
         self.assertIn("--case-hash", completed("osteon-server", "rooms", "create", "--ca"))
         self.assertIn("plan", completed("osteon-haptic", "pl"))
         self.assertIn("--timeout", completed("osteon-viewer", "--ti"))
+        self.assertIn("--language", completed("osteon", "--la"))
         self.assertEqual(completed("osteon-viewer", "--nothing-like-it"), [])
 
 

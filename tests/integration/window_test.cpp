@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 #include <signal.h>
 
-#include <QVTKOpenGLNativeWidget.h>
 #include <QAction>
 #include <QApplication>
 #include <QCheckBox>
@@ -19,7 +18,6 @@
 #include <QSpinBox>
 #include <QStackedWidget>
 #include <QStatusBar>
-#include <QSurfaceFormat>
 #include <QTest>
 #include <QToolButton>
 #include <QUrl>
@@ -29,14 +27,11 @@
 #include <chrono>
 #include <fstream>
 #include <memory>
-#include <optional>
 #include <sstream>
 #include <string>
 #include <vector>
 
-#include "tests/support/process.hpp"
-#include "tests/support/temp_dir.hpp"
-#include "tests/support/xvfb.hpp"
+#include "tests/integration/desk.hpp"
 #include "viewer_client/desktop/bone_view.hpp"
 #include "viewer_client/desktop/main_window.hpp"
 #include "viewer_client/desktop/start_page.hpp"
@@ -45,8 +40,7 @@ namespace osteon {
 namespace {
 
 using namespace std::chrono_literals;
-using test::TempDir;
-using test::Xvfb;
+using test::Desk;
 
 constexpr auto kPatience = 60s;
 
@@ -64,50 +58,6 @@ std::vector<pid_t> children(const std::string& program) {
   }
   return found;
 }
-
-// One screen, one application and one folder of the user's data for all tests.
-class Desk {
- public:
-  Desk() : screen_(Xvfb::start("1600x1100")) {
-    if (!screen_) return;
-    ::setenv("DISPLAY", screen_->display().c_str(), 1);
-    ::setenv("QT_QPA_PLATFORM", "xcb", 1);
-    ::setenv("LIBGL_ALWAYS_SOFTWARE", "1", 1);
-    for (const char* name : {"XDG_DATA_HOME", "XDG_CONFIG_HOME", "XDG_RUNTIME_DIR"}) {
-      const std::filesystem::path folder = temp_.path() / name;
-      std::filesystem::create_directories(folder);
-      std::filesystem::permissions(folder, std::filesystem::perms::owner_all);
-      ::setenv(name, folder.c_str(), 1);
-    }
-    QSurfaceFormat::setDefaultFormat(QVTKOpenGLNativeWidget::defaultFormat());
-    application_.emplace(count_, arguments_);
-    QApplication::setApplicationName("osteon");
-    QApplication::setOrganizationName("osteon");
-    // The screen's own pointer stays off the window. Otherwise the window also gets its events.
-    QCursor::setPos(1599, 1099);
-  }
-  [[nodiscard]] bool stands() const { return application_.has_value(); }
-  // A block of bone, 40 mm wide: cortical layers of 5 mm above and below marrow.
-  [[nodiscard]] std::filesystem::path bone() {
-    const std::filesystem::path folder = temp_.path() / "block";
-    if (!std::filesystem::exists(folder)) {
-      const auto made =
-          test::run(test::program("osteon-import"), {"phantom", "block", "--layers", "5:1.9,20:0.3,5:1.9", "--width",
-                                                     "40", "--pitch", "0.5", "--out", folder.string()});
-      EXPECT_EQ(made.exit_code, 0) << made.err;
-    }
-    return folder;
-  }
-  [[nodiscard]] const TempDir& temp() const { return temp_; }
-
- private:
-  TempDir temp_;
-  std::optional<Xvfb> screen_;
-  int count_ = 1;
-  char name_[7] = "osteon";
-  char* arguments_[2] = {name_, nullptr};
-  std::optional<QApplication> application_;
-};
 
 class WindowTest : public testing::Test {
  protected:

@@ -65,6 +65,8 @@ bool is_case(const std::filesystem::path& folder) {
 }
 
 QString case_title(const std::filesystem::path& bone) {
+  for (const ExampleBone& example : example_bones())
+    if (bone == example_folder(example)) return example.title;
   QFile file(text_of(bone / "case.json"));
   QString title;
   if (file.open(QIODevice::ReadOnly))

@@ -36,7 +36,7 @@ void remember(const RecentEntry& entry);
 [[nodiscard]] std::filesystem::path cases_folder();                           // of the cases that the window has made
 [[nodiscard]] std::filesystem::path example_folder(const ExampleBone& bone);  // of its case
 [[nodiscard]] std::filesystem::path new_session_folder(const std::filesystem::path& bone);
-// The title of a case, or the name of its folder.
+// The title of a case, or the name of its folder. That of an example is translated.
 [[nodiscard]] QString case_title(const std::filesystem::path& bone);
 [[nodiscard]] bool is_case(const std::filesystem::path& folder);
 [[nodiscard]] bool is_file(const std::filesystem::path& path);  // a plain one

@@ -5,13 +5,13 @@
 #include <QApplication>
 #include <QSurfaceFormat>
 #include <QTimer>
-#include <QTranslator>
 #include <cstdio>
 #include <string>
 
 #include "common/runtime/command_line.hpp"
 #include "common/runtime/log.hpp"
 #include "common/runtime/stop_signal.hpp"
+#include "viewer_client/desktop/language.hpp"
 #include "viewer_client/desktop/main_window.hpp"
 
 namespace {
@@ -22,7 +22,7 @@ constexpr const char* kProgram = "osteon";
 constexpr int kStopPeriod_ms = 100;
 
 struct Arguments {
-  std::string bone, example, tool, server, room, name;
+  std::string bone, example, tool, server, room, name, language;
   bool watch = false;
   wire::CredentialArguments credentials;
 };
@@ -39,6 +39,9 @@ void add_options(CLI::App& app, Arguments& arguments) {
       ->needs(server);
   app.add_option("--room", arguments.room, "Name of the room; not needed where the server has one");
   app.add_option("--name", arguments.name, "Who you are, shown to others");
+  app.add_option("--language", arguments.language,
+                 "Language of the window this time, en or de; without it, that of View > Language")
+      ->check(CLI::IsMember({"en", "de"}));
   wire::add_credential_options(app, arguments.credentials);
 }
 
@@ -75,8 +78,8 @@ int main(int argc, char** argv) {
   QApplication qt(argc, argv);
   QApplication::setApplicationName("osteon");
   QApplication::setOrganizationName("osteon");
-  QTranslator translator;
-  if (translator.load(QLocale(), "osteon", "_", ":/translations")) QApplication::installTranslator(&translator);
+  QApplication::setApplicationVersion(OSTEON_VERSION);
+  speak(arguments.language.empty() ? chosen_language() : QString::fromStdString(arguments.language));
 
   MainWindow window;
   window.hold_first(arguments.tool);

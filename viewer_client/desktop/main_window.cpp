@@ -31,9 +31,12 @@
 #include "viewer_client/desktop/bone_view.hpp"
 #include "viewer_client/desktop/clipping_panel.hpp"
 #include "viewer_client/desktop/gauges_panel.hpp"
+#include "viewer_client/desktop/language.hpp"
+#include "viewer_client/desktop/menu_keys.hpp"
 #include "viewer_client/desktop/properties_panel.hpp"
 #include "viewer_client/desktop/start_page.hpp"
 #include "viewer_client/desktop/tool_bar.hpp"
+#include "viewer_client/desktop/tool_names.hpp"
 #include "viewer_client/desktop/view_options.hpp"
 
 namespace osteon {
@@ -202,6 +205,8 @@ void MainWindow::make_view_menu() {
       [this](const QString& sentence) { say(sentence); }, this);
   view->addSeparator();
   for (QDockWidget* panel : findChildren<QDockWidget*>()) view->addAction(panel->toggleViewAction());
+  view->addSeparator();
+  fill_language_menu(*view->addMenu(tr("Lan&guage")), [this](const QString& sentence) { say(sentence); });
 }
 
 void MainWindow::make_tools_menu() {
@@ -249,6 +254,7 @@ void MainWindow::make_actions() {
   make_view_menu();
   make_tools_menu();
   make_help_menu();
+  for (const QAction* menu : menuBar()->actions()) add_menu_keys(*menu->menu());
   QToolBar* upper = addToolBar(tr("Actions"));
   upper->setObjectName("actions");
   for (const char* name :

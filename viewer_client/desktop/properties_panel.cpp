@@ -10,7 +10,7 @@
 #include <utility>
 
 #include "common/tools/tool.hpp"
-#include "viewer_client/desktop/tool_bar.hpp"
+#include "viewer_client/desktop/tool_names.hpp"
 #include "viewer_client/scene/tool_groups.hpp"
 #include "viewer_client/scene/tool_pointer.hpp"
 
@@ -32,7 +32,14 @@ PropertiesPanel::PropertiesPanel(std::function<void(const Chosen&)> changed,
     form->addRow(what, widget);
   };
   size_ = new QComboBox;
-  row(tr("Tool"), "size", size_);
+  size_->setObjectName("size");
+  size_->setAccessibleName(tr("Tool"));
+  // Wide enough for every tool, so that the panel, and with it the picture beside it, never changes its width.
+  for (const ToolGroup& group : tool_groups())
+    for (const std::string& tool : group.tools) size_->addItem(tool_title(tool));
+  size_->setMinimumWidth(size_->sizeHint().width());
+  size_->clear();
+  form->addRow(size_);
   rpm_ = new QSpinBox;
   rpm_->setRange(0, kMostRpm);
   rpm_->setSingleStep(100);

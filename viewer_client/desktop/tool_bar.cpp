@@ -9,25 +9,10 @@
 
 #include "common/tools/tool.hpp"
 #include "viewer_client/desktop/tool_icon.hpp"
+#include "viewer_client/desktop/tool_names.hpp"
 #include "viewer_client/scene/tool_groups.hpp"
 
 namespace osteon {
-
-QString tool_title(const std::string& name) {
-  const Result<Tool> tool = find_tool(name);
-  const QByteArray title = QByteArray::fromStdString(tool ? tool->title : name);
-  return QCoreApplication::translate("Tools", title.constData());
-}
-
-QString group_title(const std::string& name) {
-  static const std::map<std::string, const char*> titles{
-      {"drill", QT_TRANSLATE_NOOP("Tools", "Drills")},    {"bur", QT_TRANSLATE_NOOP("Tools", "Burs")},
-      {"saw", QT_TRANSLATE_NOOP("Tools", "Saws")},        {"reamer", QT_TRANSLATE_NOOP("Tools", "Reamers")},
-      {"broach", QT_TRANSLATE_NOOP("Tools", "Broaches")}, {"guide", QT_TRANSLATE_NOOP("Tools", "Guides and trials")},
-      {"pin", QT_TRANSLATE_NOOP("Tools", "Pins")},        {"screw", QT_TRANSLATE_NOOP("Tools", "Screws")}};
-  const auto found = titles.find(name);
-  return found == titles.end() ? QString::fromStdString(name) : QCoreApplication::translate("Tools", found->second);
-}
 
 SurgeryToolBar::SurgeryToolBar(std::function<void(const std::string& tool)> taken, QWidget* parent)
     : QToolBar(parent), taken_(std::move(taken)), group_(new QActionGroup(this)) {

@@ -32,8 +32,4 @@ class SurgeryToolBar : public QToolBar {
   std::map<std::string, class QToolButton*> buttons_;  // of a tool's group
 };
 
-// A tool's title in the user's language.
-[[nodiscard]] QString tool_title(const std::string& name);
-[[nodiscard]] QString group_title(const std::string& name);
-
 }  // namespace osteon

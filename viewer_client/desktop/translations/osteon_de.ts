@@ -1,0 +1,758 @@
+<?xml version="1.0" encoding="utf-8"?>
+<!DOCTYPE TS>
+<TS version="2.1" language="de">
+<context>
+    <name>BoneView</name>
+    <message>
+        <source>Receiving the surface, %1 %</source>
+        <translation>Oberfläche wird empfangen, %1 %</translation>
+    </message>
+</context>
+<context>
+    <name>CaseMaker</name>
+    <message>
+        <source>Cannot make the folder %1. Choose a place where you may write.</source>
+        <translation>Der Ordner %1 lässt sich nicht anlegen. Wählen Sie einen Ort, an dem Sie schreiben dürfen.</translation>
+    </message>
+    <message>
+        <source>osteon-import is not installed. Install the package osteon-import.</source>
+        <translation>osteon-import ist nicht installiert. Installieren Sie das Paket osteon-import.</translation>
+    </message>
+    <message>
+        <source>osteon-import ended without a case.</source>
+        <translation>osteon-import endete ohne einen Fall.</translation>
+    </message>
+</context>
+<context>
+    <name>GaugesPanel</name>
+    <message>
+        <source>Push</source>
+        <translation>Andruck</translation>
+    </message>
+    <message>
+        <source>Force of the bone</source>
+        <translation>Kraft des Knochens</translation>
+    </message>
+    <message>
+        <source>Force on the hand</source>
+        <translation>Kraft auf die Hand</translation>
+    </message>
+    <message>
+        <source>Torque</source>
+        <translation>Drehmoment</translation>
+    </message>
+    <message>
+        <source>Depth</source>
+        <translation>Eindringtiefe</translation>
+    </message>
+    <message>
+        <source>Spindle</source>
+        <translation>Drehzahl</translation>
+    </message>
+    <message>
+        <source>Feed</source>
+        <translation>Vorschub</translation>
+    </message>
+    <message>
+        <source>Density</source>
+        <translation>Dichte</translation>
+    </message>
+    <message>
+        <source>&lt;span style=&apos;color:#0072b2&apos;&gt;—&lt;/span&gt; bone   &lt;span style=&apos;color:#e69f00&apos;&gt;- -&lt;/span&gt; hand</source>
+        <translation>&lt;span style=&apos;color:#0072b2&apos;&gt;—&lt;/span&gt; Knochen   &lt;span style=&apos;color:#e69f00&apos;&gt;- -&lt;/span&gt; Hand</translation>
+    </message>
+    <message>
+        <source>%1 N</source>
+        <translation>%1 N</translation>
+    </message>
+    <message>
+        <source>%1 Nmm</source>
+        <translation>%1 Nmm</translation>
+    </message>
+    <message>
+        <source>%1 mm</source>
+        <translation>%1 mm</translation>
+    </message>
+    <message>
+        <source>%1 rpm</source>
+        <translation>%1 U/min</translation>
+    </message>
+    <message>
+        <source>%1 mm/s</source>
+        <translation>%1 mm/s</translation>
+    </message>
+    <message>
+        <source>%1 g/cm³</source>
+        <translation>%1 g/cm³</translation>
+    </message>
+</context>
+<context>
+    <name>Language</name>
+    <message>
+        <source>&amp;System</source>
+        <translation>&amp;System</translation>
+    </message>
+    <message>
+        <source>The choice takes effect at the next start.</source>
+        <translation>Die Wahl gilt ab dem nächsten Start.</translation>
+    </message>
+</context>
+<context>
+    <name>Library</name>
+    <message>
+        <source>Human skull, from CT</source>
+        <translation>Schädel eines Menschen, aus dem CT</translation>
+    </message>
+    <message>
+        <source>Femur, a phantom</source>
+        <translation>Femur, Phantom</translation>
+    </message>
+    <message>
+        <source>Tibia, a phantom</source>
+        <translation>Tibia, Phantom</translation>
+    </message>
+    <message>
+        <source>Patella, a phantom</source>
+        <translation>Patella, Phantom</translation>
+    </message>
+    <message>
+        <source>Knee, a phantom</source>
+        <translation>Knie, Phantom</translation>
+    </message>
+    <message>
+        <source>Hip, a phantom</source>
+        <translation>Hüfte, Phantom</translation>
+    </message>
+    <message>
+        <source>Pelvis, a phantom</source>
+        <translation>Becken, Phantom</translation>
+    </message>
+</context>
+<context>
+    <name>MainWindow</name>
+    <message>
+        <source>The bone</source>
+        <translation>Der Knochen</translation>
+    </message>
+    <message>
+        <source>Before %1</source>
+        <translation>Vor: %1</translation>
+    </message>
+    <message>
+        <source>Tool</source>
+        <translation>Werkzeug</translation>
+    </message>
+    <message>
+        <source>Gauges</source>
+        <translation>Messwerte</translation>
+    </message>
+    <message>
+        <source>&amp;File</source>
+        <translation>&amp;Datei</translation>
+    </message>
+    <message>
+        <source>&amp;Start page</source>
+        <translation>&amp;Startseite</translation>
+    </message>
+    <message>
+        <source>&amp;Open a case…</source>
+        <translation>Fall öff&amp;nen…</translation>
+    </message>
+    <message>
+        <source>&amp;Import a CT…</source>
+        <translation>CT &amp;importieren…</translation>
+    </message>
+    <message>
+        <source>&amp;Join a room…</source>
+        <translation>Einem &amp;Raum beitreten…</translation>
+    </message>
+    <message>
+        <source>Save a &amp;picture…</source>
+        <translation>Bild s&amp;peichern…</translation>
+    </message>
+    <message>
+        <source>&amp;Quit</source>
+        <translation>&amp;Beenden</translation>
+    </message>
+    <message>
+        <source>&amp;Edit</source>
+        <translation>&amp;Bearbeiten</translation>
+    </message>
+    <message>
+        <source>&amp;Undo</source>
+        <translation>&amp;Rückgängig</translation>
+    </message>
+    <message>
+        <source>&amp;Redo</source>
+        <translation>&amp;Wiederholen</translation>
+    </message>
+    <message>
+        <source>Done again.</source>
+        <translation>Wiederholt.</translation>
+    </message>
+    <message>
+        <source>&amp;Mark this moment…</source>
+        <translation>Zeitpunkt &amp;markieren…</translation>
+    </message>
+    <message>
+        <source>&amp;View</source>
+        <translation>&amp;Ansicht</translation>
+    </message>
+    <message>
+        <source>&amp;Whole bone</source>
+        <translation>Ganzer &amp;Knochen</translation>
+    </message>
+    <message>
+        <source>At the &amp;tool</source>
+        <translation>Am &amp;Werkzeug</translation>
+    </message>
+    <message>
+        <source>From the &amp;front</source>
+        <translation>Von &amp;vorn</translation>
+    </message>
+    <message>
+        <source>From the &amp;back</source>
+        <translation>Von &amp;hinten</translation>
+    </message>
+    <message>
+        <source>From the patient&apos;s &amp;left</source>
+        <translation>Von &amp;links (Patient)</translation>
+    </message>
+    <message>
+        <source>From the patient&apos;s &amp;right</source>
+        <translation>Von &amp;rechts (Patient)</translation>
+    </message>
+    <message>
+        <source>From &amp;above</source>
+        <translation>Von &amp;oben</translation>
+    </message>
+    <message>
+        <source>From b&amp;elow</source>
+        <translation>Von &amp;unten</translation>
+    </message>
+    <message>
+        <source>F&amp;ull screen</source>
+        <translation>Voll&amp;bild</translation>
+    </message>
+    <message>
+        <source>Lan&amp;guage</source>
+        <translation>&amp;Sprache</translation>
+    </message>
+    <message>
+        <source>&amp;Tools</source>
+        <translation>&amp;Werkzeuge</translation>
+    </message>
+    <message>
+        <source>&amp;Put the tool down</source>
+        <translation>Werkzeug &amp;ablegen</translation>
+    </message>
+    <message>
+        <source>Run the &amp;spindle</source>
+        <translation>A&amp;ntrieb ein</translation>
+    </message>
+    <message>
+        <source>S&amp;ound</source>
+        <translation>&amp;Ton</translation>
+    </message>
+    <message>
+        <source>&amp;Help</source>
+        <translation>&amp;Hilfe</translation>
+    </message>
+    <message>
+        <source>&amp;How to hold a tool</source>
+        <translation>So &amp;halten Sie ein Werkzeug</translation>
+    </message>
+    <message>
+        <source>&amp;About Osteon</source>
+        <translation>Ü&amp;ber Osteon</translation>
+    </message>
+    <message>
+        <source>About Osteon</source>
+        <translation>Über Osteon</translation>
+    </message>
+    <message>
+        <source>Osteon %1 simulates bone surgery. It is for research and teaching. It is not a medical device.</source>
+        <translation>Osteon %1 simuliert Knochenchirurgie. Es dient Forschung und Lehre. Es ist kein Medizinprodukt.</translation>
+    </message>
+    <message>
+        <source>Actions</source>
+        <translation>Aktionen</translation>
+    </message>
+    <message>
+        <source>Cancelled. Nothing was written.</source>
+        <translation>Abgebrochen. Nichts wurde gespeichert.</translation>
+    </message>
+    <message>
+        <source>%1 is made now. The next time it opens at once.</source>
+        <translation>%1 wird jetzt erzeugt. Beim nächsten Mal öffnet sich der Fall sofort.</translation>
+    </message>
+    <message>
+        <source>Importing %1</source>
+        <translation>%1 wird importiert</translation>
+    </message>
+    <message>
+        <source>The folder of a CT</source>
+        <translation>Ordner eines CT</translation>
+    </message>
+    <message>
+        <source>The folder of a case</source>
+        <translation>Ordner eines Falls</translation>
+    </message>
+    <message>
+        <source>%1 is not the folder of a case: it has no case.json. Choose such a folder, or import a CT.</source>
+        <translation>%1 ist nicht der Ordner eines Falls: case.json fehlt. Wählen Sie einen solchen Ordner, oder importieren Sie ein CT.</translation>
+    </message>
+    <message>
+        <source>Join a room</source>
+        <translation>Einem Raum beitreten</translation>
+    </message>
+    <message>
+        <source>Server, HOST:PORT</source>
+        <translation>Server, HOST:PORT</translation>
+    </message>
+    <message>
+        <source>Room (empty: the only one)</source>
+        <translation>Raum (leer: der einzige)</translation>
+    </message>
+    <message>
+        <source>Your name</source>
+        <translation>Ihr Name</translation>
+    </message>
+    <message>
+        <source>Folder of your certificate</source>
+        <translation>Ordner Ihres Zertifikats</translation>
+    </message>
+    <message>
+        <source>File of your ticket</source>
+        <translation>Datei Ihres Tickets</translation>
+    </message>
+    <message>
+        <source>%1, %2</source>
+        <translation>%1, %2</translation>
+    </message>
+    <message>
+        <source>%1 – Osteon</source>
+        <translation>%1 – Osteon</translation>
+    </message>
+    <message>
+        <source>The room opens…</source>
+        <translation>Der Raum öffnet sich…</translation>
+    </message>
+    <message>
+        <source>Choose a tool on the left, then hold the left button on the bone.</source>
+        <translation>Wählen Sie links ein Werkzeug, dann halten Sie die linke Taste auf dem Knochen.</translation>
+    </message>
+    <message>
+        <source>Hold the left button on the bone to push. The wheel sets the push, the right button turns the tool.</source>
+        <translation>Die linke Taste drückt auf den Knochen. Das Rad stellt den Andruck ein, die rechte Taste dreht das Werkzeug.</translation>
+    </message>
+    <message>
+        <source>Click on the bone to place it there.</source>
+        <translation>Klicken Sie auf die Stelle des Knochens.</translation>
+    </message>
+    <message>
+        <source>Placed.</source>
+        <translation>Platziert.</translation>
+    </message>
+    <message>
+        <source>Undone.</source>
+        <translation>Rückgängig gemacht.</translation>
+    </message>
+    <message>
+        <source>Mark this moment</source>
+        <translation>Zeitpunkt markieren</translation>
+    </message>
+    <message>
+        <source>Its name</source>
+        <translation>Bezeichnung</translation>
+    </message>
+    <message>
+        <source>Marked.</source>
+        <translation>Markiert.</translation>
+    </message>
+    <message>
+        <source>Save the picture</source>
+        <translation>Bild speichern</translation>
+    </message>
+    <message>
+        <source>Pictures (*.png)</source>
+        <translation>Bilder (*.png)</translation>
+    </message>
+    <message>
+        <source>Saved %1.</source>
+        <translation>%1 ist gespeichert.</translation>
+    </message>
+    <message>
+        <source>How to hold a tool</source>
+        <translation>So halten Sie ein Werkzeug</translation>
+    </message>
+    <message>
+        <source>&lt;p&gt;&lt;b&gt;Choose a tool&lt;/b&gt; in the left bar. A long click shows the other tools of its group.&lt;/p&gt;&lt;p&gt;&lt;b&gt;Move the mouse&lt;/b&gt; over the bone: the tool rests where the pointer is.&lt;br&gt;&lt;b&gt;Hold the left button&lt;/b&gt;: the hand pushes. &lt;b&gt;Wheel&lt;/b&gt;: how hard it pushes.&lt;br&gt;&lt;b&gt;Drag with the right button&lt;/b&gt;: turns the tool; with Ctrl about its own axis.&lt;br&gt;&lt;b&gt;Shift&lt;/b&gt;: motions at a tenth. &lt;b&gt;Space&lt;/b&gt;: spindle on or off. &lt;b&gt;Esc&lt;/b&gt;: put the tool down.&lt;/p&gt;&lt;p&gt;&lt;b&gt;Middle button&lt;/b&gt;: turns the bone; with Shift it moves it. &lt;b&gt;Ctrl and wheel&lt;/b&gt;: nearer or farther. Beside the bone, and without a tool, the left button and the wheel do this too.&lt;/p&gt;</source>
+        <translation>&lt;p&gt;&lt;b&gt;Wählen Sie ein Werkzeug&lt;/b&gt; in der linken Leiste. Ein langer Klick zeigt die anderen Werkzeuge der Gruppe.&lt;/p&gt;&lt;p&gt;&lt;b&gt;Bewegen Sie die Maus&lt;/b&gt; über den Knochen: Das Werkzeug liegt dort auf, wo der Zeiger ist.&lt;br&gt;&lt;b&gt;Linke Taste halten&lt;/b&gt;: Die Hand drückt. &lt;b&gt;Rad&lt;/b&gt;: wie stark sie drückt.&lt;br&gt;&lt;b&gt;Mit der rechten Taste ziehen&lt;/b&gt;: dreht das Werkzeug, mit Strg um seine eigene Achse.&lt;br&gt;&lt;b&gt;Umschalt&lt;/b&gt;: ein Zehntel der Bewegung. &lt;b&gt;Leertaste&lt;/b&gt;: Antrieb ein oder aus. &lt;b&gt;Esc&lt;/b&gt;: Werkzeug ablegen.&lt;/p&gt;&lt;p&gt;&lt;b&gt;Mittlere Taste&lt;/b&gt;: dreht den Knochen, mit Umschalt verschiebt sie ihn. &lt;b&gt;Strg und Rad&lt;/b&gt;: näher oder ferner. Neben dem Knochen und ohne Werkzeug tun die linke Taste und das Rad dasselbe.&lt;/p&gt;</translation>
+    </message>
+    <message>
+        <source>Connection lost, trying again</source>
+        <translation>Verbindung verloren, neuer Versuch läuft</translation>
+    </message>
+    <message>
+        <source>Connected to %1</source>
+        <translation>Verbunden mit %1</translation>
+    </message>
+    <message>
+        <source>Tip %1, %2, %3 mm</source>
+        <translation>Spitze %1; %2; %3 mm</translation>
+    </message>
+    <message>
+        <source>Pointer</source>
+        <translation>Zeiger</translation>
+    </message>
+    <message>
+        <source>The pointer&apos;s device is away</source>
+        <translation>Das Zeigergerät fehlt</translation>
+    </message>
+</context>
+<context>
+    <name>PracticeRoom</name>
+    <message>
+        <source>Cannot make the folder %1. Choose a place where you may write.</source>
+        <translation>Der Ordner %1 lässt sich nicht anlegen. Wählen Sie einen Ort, an dem Sie schreiben dürfen.</translation>
+    </message>
+    <message>
+        <source>osteon-server is not installed. Install the package osteon-server.</source>
+        <translation>osteon-server ist nicht installiert. Installieren Sie das Paket osteon-server.</translation>
+    </message>
+    <message>
+        <source>osteon-haptic is not installed. Install the package osteon.</source>
+        <translation>osteon-haptic ist nicht installiert. Installieren Sie das Paket osteon.</translation>
+    </message>
+    <message>
+        <source>The server ended.</source>
+        <translation>Der Server endete.</translation>
+    </message>
+    <message>
+        <source>The server ended and starts again. Nothing that it acknowledged is lost.</source>
+        <translation>Der Server endete und startet neu. Nichts, was er bestätigt hat, ist verloren.</translation>
+    </message>
+    <message>
+        <source>The haptic client ended.</source>
+        <translation>Der haptische Client endete.</translation>
+    </message>
+    <message>
+        <source>The haptic client ended and starts again.</source>
+        <translation>Der haptische Client endete und startet neu.</translation>
+    </message>
+    <message>
+        <source>There is no sound: %1</source>
+        <translation>Es gibt keinen Ton: %1</translation>
+    </message>
+</context>
+<context>
+    <name>PropertiesPanel</name>
+    <message>
+        <source>Tool</source>
+        <translation>Werkzeug</translation>
+    </message>
+    <message>
+        <source> rpm</source>
+        <translation> U/min</translation>
+    </message>
+    <message>
+        <source>Spindle</source>
+        <translation>Drehzahl</translation>
+    </message>
+    <message>
+        <source> N</source>
+        <translation> N</translation>
+    </message>
+    <message>
+        <source>Push</source>
+        <translation>Andruck</translation>
+    </message>
+    <message>
+        <source>Teeth</source>
+        <translation>Zähne</translation>
+    </message>
+    <message>
+        <source>Feed per turn</source>
+        <translation>Vorschub je Umdrehung</translation>
+    </message>
+    <message>
+        <source>%1 mm</source>
+        <translation>%1 mm</translation>
+    </message>
+</context>
+<context>
+    <name>QDockWidget</name>
+    <message>
+        <source>Float</source>
+        <translation>Herauslösen</translation>
+    </message>
+    <message>
+        <source>Undocks and re-attaches the dock widget</source>
+        <translation>Löst das Feld aus dem Fenster und setzt es wieder ein</translation>
+    </message>
+    <message>
+        <source>Close</source>
+        <translation>Schließen</translation>
+    </message>
+    <message>
+        <source>Closes the dock widget</source>
+        <translation>Schließt das Feld</translation>
+    </message>
+</context>
+<context>
+    <name>QPlatformTheme</name>
+    <message>
+        <source>OK</source>
+        <translation>OK</translation>
+    </message>
+    <message>
+        <source>Cancel</source>
+        <translation>Abbrechen</translation>
+    </message>
+</context>
+<context>
+    <name>QShortcut</name>
+    <message>
+        <source>Ctrl</source>
+        <translation>Strg</translation>
+    </message>
+    <message>
+        <source>Shift</source>
+        <translation>Umschalt</translation>
+    </message>
+    <message>
+        <source>Home</source>
+        <translation>Pos1</translation>
+    </message>
+    <message>
+        <source>Esc</source>
+        <translation>Esc</translation>
+    </message>
+</context>
+<context>
+    <name>ScrollingPlot</name>
+    <message>
+        <source>Force over the last ten seconds</source>
+        <translation>Kraft der letzten zehn Sekunden</translation>
+    </message>
+    <message>
+        <source>%1 N</source>
+        <translation>%1 N</translation>
+    </message>
+</context>
+<context>
+    <name>StartPage</name>
+    <message>
+        <source>Practise bone surgery. For research and teaching; not a medical device.</source>
+        <translation>Üben Sie Knochenchirurgie. Für Forschung und Lehre; kein Medizinprodukt.</translation>
+    </message>
+    <message>
+        <source>Bones to practise on</source>
+        <translation>Knochen zum Üben</translation>
+    </message>
+    <message>
+        <source>Go on with</source>
+        <translation>Weiter mit</translation>
+    </message>
+    <message>
+        <source>Your own</source>
+        <translation>Eigene Daten</translation>
+    </message>
+    <message>
+        <source>Progress</source>
+        <translation>Fortschritt</translation>
+    </message>
+    <message>
+        <source>Cancel</source>
+        <translation>Abbrechen</translation>
+    </message>
+    <message>
+        <source>Sessions to go on with</source>
+        <translation>Sitzungen zum Fortsetzen</translation>
+    </message>
+    <message>
+        <source>&amp;Import a CT…</source>
+        <translation>CT &amp;importieren…</translation>
+    </message>
+    <message>
+        <source>Make a case from a folder of DICOM files, a zip or ISO file, NIfTI, NRRD or MetaImage</source>
+        <translation>Erzeugt einen Fall aus einem Ordner mit DICOM-Dateien, einer Zip- oder ISO-Datei, NIfTI, NRRD oder MetaImage</translation>
+    </message>
+    <message>
+        <source>&amp;Open a case…</source>
+        <translation>Fall öff&amp;nen…</translation>
+    </message>
+    <message>
+        <source>Open the folder of a case</source>
+        <translation>Öffnet den Ordner eines Falls</translation>
+    </message>
+    <message>
+        <source>&amp;Join a room…</source>
+        <translation>Einem &amp;Raum beitreten…</translation>
+    </message>
+    <message>
+        <source>Join a room on a server, with certificate and ticket</source>
+        <translation>Tritt einem Raum auf einem Server bei, mit Zertifikat und Ticket</translation>
+    </message>
+</context>
+<context>
+    <name>Tools</name>
+    <message>
+        <source>Tools</source>
+        <translation>Werkzeuge</translation>
+    </message>
+    <message>
+        <source>Femoral broach</source>
+        <translation>Femurraspel</translation>
+    </message>
+    <message>
+        <source>Tibial keel broach</source>
+        <translation>Raspel für den Tibiakiel</translation>
+    </message>
+    <message>
+        <source>Barrel bur 6 mm</source>
+        <translation>Tonnenfräse 6 mm</translation>
+    </message>
+    <message>
+        <source>Contoured cutting bur 4 mm</source>
+        <translation>Konturfräse 4 mm</translation>
+    </message>
+    <message>
+        <source>Round bur 3.2 mm</source>
+        <translation>Kugelfräse 3,2 mm</translation>
+    </message>
+    <message>
+        <source>Round bur 5 mm</source>
+        <translation>Kugelfräse 5 mm</translation>
+    </message>
+    <message>
+        <source>Round bur 6 mm</source>
+        <translation>Kugelfräse 6 mm</translation>
+    </message>
+    <message>
+        <source>Drill 1/8 inch</source>
+        <translation>Bohrer 1/8 Zoll</translation>
+    </message>
+    <message>
+        <source>Drill 3.2 mm</source>
+        <translation>Bohrer 3,2 mm</translation>
+    </message>
+    <message>
+        <source>Drill 3.5 mm</source>
+        <translation>Bohrer 3,5 mm</translation>
+    </message>
+    <message>
+        <source>Drill 5/16 inch</source>
+        <translation>Bohrer 5/16 Zoll</translation>
+    </message>
+    <message>
+        <source>End drill 9.5 mm</source>
+        <translation>Stirnbohrer 9,5 mm</translation>
+    </message>
+    <message>
+        <source>Drill sleeve 3.2 mm</source>
+        <translation>Bohrhülse 3,2 mm</translation>
+    </message>
+    <message>
+        <source>Distal cutting block</source>
+        <translation>Distaler Schnittblock</translation>
+    </message>
+    <message>
+        <source>4-in-1 cutting block</source>
+        <translation>4-in-1-Schnittblock</translation>
+    </message>
+    <message>
+        <source>Headless pin 1/8 inch</source>
+        <translation>Pin ohne Kopf 1/8 Zoll</translation>
+    </message>
+    <message>
+        <source>Headed pin 1/8 inch</source>
+        <translation>Pin mit Kopf 1/8 Zoll</translation>
+    </message>
+    <message>
+        <source>Steinmann pin 4 mm</source>
+        <translation>Steinmann-Nagel 4 mm</translation>
+    </message>
+    <message>
+        <source>Cylindrical reamer 12 mm</source>
+        <translation>Zylinderfräse 12 mm</translation>
+    </message>
+    <message>
+        <source>Cylindrical outside reamer 46 mm</source>
+        <translation>Zylindrische Außenfräse 46 mm</translation>
+    </message>
+    <message>
+        <source>Acetabular reamer 50 mm</source>
+        <translation>Pfannenfräse 50 mm</translation>
+    </message>
+    <message>
+        <source>Oscillating saw 25 mm</source>
+        <translation>Oszillierende Säge 25 mm</translation>
+    </message>
+    <message>
+        <source>Oscillating saw 19 mm</source>
+        <translation>Oszillierende Säge 19 mm</translation>
+    </message>
+    <message>
+        <source>Oscillating saw 9.5 mm</source>
+        <translation>Oszillierende Säge 9,5 mm</translation>
+    </message>
+    <message>
+        <source>Reciprocating saw</source>
+        <translation>Stichsäge</translation>
+    </message>
+    <message>
+        <source>Cortical screw 3.5 mm</source>
+        <translation>Kortikalisschraube 3,5 mm</translation>
+    </message>
+    <message>
+        <source>Cortical screw 4.5 mm</source>
+        <translation>Kortikalisschraube 4,5 mm</translation>
+    </message>
+    <message>
+        <source>Cancellous screw 6.5 mm</source>
+        <translation>Spongiosaschraube 6,5 mm</translation>
+    </message>
+    <message>
+        <source>Trial cup 50 mm</source>
+        <translation>Probepfanne 50 mm</translation>
+    </message>
+    <message>
+        <source>Trial stem</source>
+        <translation>Probeschaft</translation>
+    </message>
+    <message>
+        <source>Drills</source>
+        <translation>Bohrer</translation>
+    </message>
+    <message>
+        <source>Burs</source>
+        <translation>High-Speed-Fräsen</translation>
+    </message>
+    <message>
+        <source>Saws</source>
+        <translation>Sägen</translation>
+    </message>
+    <message>
+        <source>Reamers</source>
+        <translation>Pfannen- und Zylinderfräsen</translation>
+    </message>
+    <message>
+        <source>Broaches</source>
+        <translation>Raspeln</translation>
+    </message>
+    <message>
+        <source>Guides and trials</source>
+        <translation>Führungen und Probeimplantate</translation>
+    </message>
+    <message>
+        <source>Pins</source>
+        <translation>Pins und Nägel</translation>
+    </message>
+    <message>
+        <source>Screws</source>
+        <translation>Schrauben</translation>
+    </message>
+</context>
+</TS>
