@@ -66,8 +66,8 @@ class Watcher:
         """After the work a user at a terminal looks at the bone. Without one, the window closes at once."""
         self.check()
         if self._child is not None and self._stays:
-            self._say("The work is done. Turn the bone to see all its sides. Close the window, or press Ctrl-C, for the "
-                      "report.")
+            self._say("The work is done. Turn the bone to see all its sides. Close the window, or press Ctrl-C, for "
+                      "the report.")
             try:
                 while self._child.wait(3600.0) is None:
                     pass

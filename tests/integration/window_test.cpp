@@ -415,6 +415,10 @@ TEST_F(WindowTest, AWindowThatWatchesFollowsTheToolAndChangesNothing) {
   }));
   other.watch({address, {}, {}, {}});
   ASSERT_TRUE(until([&] { return seen->surface_shown(); })) << problem();
+  // The mouse works in the window above.
+  window_->raise();
+  window_->activateWindow();
+  ASSERT_TRUE(QTest::qWaitForWindowActive(window_.get()));
 
   // No tool, no item and no undo, whatever is chosen.
   for (const char* name : {"undo", "redo", "mark", "put_down", "spindle"})
