@@ -11,16 +11,55 @@
 <context>
     <name>CaseMaker</name>
     <message>
-        <source>Cannot make the folder %1. Choose a place where you may write.</source>
-        <translation>Der Ordner %1 lässt sich nicht anlegen. Wählen Sie einen Ort, an dem Sie schreiben dürfen.</translation>
-    </message>
-    <message>
-        <source>osteon-import is not installed. Install the package osteon-import.</source>
-        <translation>osteon-import ist nicht installiert. Installieren Sie das Paket osteon-import.</translation>
-    </message>
-    <message>
         <source>osteon-import ended without a case.</source>
         <translation>osteon-import endete ohne einen Fall.</translation>
+    </message>
+</context>
+<context>
+    <name>ClippingPanel</name>
+    <message>
+        <source>A box</source>
+        <translation>Ein Quader</translation>
+    </message>
+    <message>
+        <source>Right</source>
+        <translation>Rechts</translation>
+    </message>
+    <message>
+        <source>Left</source>
+        <translation>Links</translation>
+    </message>
+    <message>
+        <source>Front</source>
+        <translation>Vorn</translation>
+    </message>
+    <message>
+        <source>Back</source>
+        <translation>Hinten</translation>
+    </message>
+    <message>
+        <source>Foot</source>
+        <translation>Fuß</translation>
+    </message>
+    <message>
+        <source>Head</source>
+        <translation>Kopf</translation>
+    </message>
+    <message>
+        <source>A plane</source>
+        <translation>Eine Ebene</translation>
+    </message>
+    <message>
+        <source>Depth</source>
+        <translation>Tiefe</translation>
+    </message>
+    <message>
+        <source>Turn the plane to me</source>
+        <translation>Ebene zu mir drehen</translation>
+    </message>
+    <message>
+        <source>Whole bone</source>
+        <translation>Ganzer Knochen</translation>
     </message>
 </context>
 <context>
@@ -84,6 +123,21 @@
     <message>
         <source>%1 g/cm³</source>
         <translation>%1 g/cm³</translation>
+    </message>
+</context>
+<context>
+    <name>ImporterRun</name>
+    <message>
+        <source>Cannot make the folder %1. Choose a place where you may write.</source>
+        <translation>Der Ordner %1 kann nicht angelegt werden. Wählen Sie einen Ort, an dem Sie schreiben dürfen.</translation>
+    </message>
+    <message>
+        <source>osteon-import is not installed. Install the package osteon-import.</source>
+        <translation>osteon-import ist nicht installiert. Installieren Sie das Paket osteon-import.</translation>
+    </message>
+    <message>
+        <source>osteon-import ended without a result.</source>
+        <translation>osteon-import endete ohne Ergebnis.</translation>
     </message>
 </context>
 <context>
@@ -295,14 +349,6 @@
         <translation>Ordner eines CT</translation>
     </message>
     <message>
-        <source>The folder of a case</source>
-        <translation>Ordner eines Falls</translation>
-    </message>
-    <message>
-        <source>%1 is not the folder of a case: it has no case.json. Choose such a folder, or import a CT.</source>
-        <translation>%1 ist nicht der Ordner eines Falls: case.json fehlt. Wählen Sie einen solchen Ordner, oder importieren Sie ein CT.</translation>
-    </message>
-    <message>
         <source>Join a room</source>
         <translation>Einem Raum beitreten</translation>
     </message>
@@ -409,6 +455,50 @@
     <message>
         <source>The pointer&apos;s device is away</source>
         <translation>Das Zeigergerät fehlt</translation>
+    </message>
+    <message>
+        <source>Open the bone</source>
+        <translation>Knochen öffnen</translation>
+    </message>
+    <message>
+        <source>Save &amp;bone as…</source>
+        <translation>&amp;Knochen speichern unter…</translation>
+    </message>
+    <message>
+        <source>Open a case</source>
+        <translation>Fall öffnen</translation>
+    </message>
+    <message>
+        <source>Cases (*.osteon case.json);;All files (*)</source>
+        <translation>Fälle (*.osteon case.json);;Alle Dateien (*)</translation>
+    </message>
+    <message>
+        <source>Opening %1</source>
+        <translation>%1 wird geöffnet</translation>
+    </message>
+    <message>
+        <source>Save the bone</source>
+        <translation>Knochen speichern</translation>
+    </message>
+    <message>
+        <source>Cases (*.osteon)</source>
+        <translation>Fälle (*.osteon)</translation>
+    </message>
+    <message>
+        <source>Another bone is being saved. Try again when that is done.</source>
+        <translation>Ein anderer Knochen wird gerade gespeichert. Versuchen Sie es danach noch einmal.</translation>
+    </message>
+    <message>
+        <source>Saving %1: %2 %</source>
+        <translation>%1 wird gespeichert: %2 %</translation>
+    </message>
+    <message>
+        <source>%1 is no case: drop an .osteon file, or the folder of a case.</source>
+        <translation>%1 ist kein Fall: Ziehen Sie eine .osteon-Datei oder den Ordner eines Falls hierher.</translation>
+    </message>
+    <message>
+        <source>You watch. The view follows the tool; a drag turns the bone, T follows again.</source>
+        <translation>Sie schauen zu. Die Ansicht folgt dem Werkzeug; Ziehen dreht den Knochen, T folgt wieder.</translation>
     </message>
 </context>
 <context>
@@ -584,16 +674,16 @@
         <translation>Fall öff&amp;nen…</translation>
     </message>
     <message>
-        <source>Open the folder of a case</source>
-        <translation>Öffnet den Ordner eines Falls</translation>
-    </message>
-    <message>
         <source>&amp;Join a room…</source>
         <translation>Einem &amp;Raum beitreten…</translation>
     </message>
     <message>
         <source>Join a room on a server, with certificate and ticket</source>
         <translation>Tritt einem Raum auf einem Server bei, mit Zertifikat und Ticket</translation>
+    </message>
+    <message>
+        <source>Open an .osteon file, or the case.json of a case&apos;s folder</source>
+        <translation>Öffnet eine .osteon-Datei oder die case.json im Ordner eines Falls</translation>
     </message>
 </context>
 <context>
@@ -753,6 +843,61 @@
     <message>
         <source>Screws</source>
         <translation>Schrauben</translation>
+    </message>
+</context>
+<context>
+    <name>ViewOptions</name>
+    <message>
+        <source>&amp;Cube of the patient&apos;s sides</source>
+        <translation>&amp;Würfel mit den Seiten des Patienten</translation>
+    </message>
+    <message>
+        <source>&amp;Stereo</source>
+        <translation>&amp;Stereo</translation>
+    </message>
+    <message>
+        <source>&amp;Kept views</source>
+        <translation>Gemer&amp;kte Ansichten</translation>
+    </message>
+    <message>
+        <source>&amp;Keep this view</source>
+        <translation>Diese Ansicht &amp;merken</translation>
+    </message>
+    <message>
+        <source>&amp;Forget the kept views</source>
+        <translation>Gemerkte Ansichten &amp;vergessen</translation>
+    </message>
+    <message>
+        <source>View &amp;%1</source>
+        <translation>Ansicht &amp;%1</translation>
+    </message>
+    <message>
+        <source>&amp;Off</source>
+        <translation>&amp;Aus</translation>
+    </message>
+    <message>
+        <source>&amp;Anaglyph, for red and cyan glasses</source>
+        <translation>&amp;Anaglyph, für Rot-Cyan-Brillen</translation>
+    </message>
+    <message>
+        <source>&amp;Side by side</source>
+        <translation>&amp;Nebeneinander</translation>
+    </message>
+    <message>
+        <source>&amp;Quad buffer</source>
+        <translation>&amp;Quad-Buffer</translation>
+    </message>
+    <message>
+        <source>This display has no quad buffer, so stereo is off. Choose anaglyph or side by side.</source>
+        <translation>Dieser Bildschirm hat keinen Quad-Buffer, deshalb ist Stereo aus. Wählen Sie Anaglyph oder Nebeneinander.</translation>
+    </message>
+    <message>
+        <source>Nine views are kept already. Forget them first.</source>
+        <translation>Neun Ansichten sind schon gemerkt. Vergessen Sie diese zuerst.</translation>
+    </message>
+    <message>
+        <source>Kept as view %1.</source>
+        <translation>Als Ansicht %1 gemerkt.</translation>
     </message>
 </context>
 </TS>
