@@ -122,6 +122,8 @@ Faults clipped(const QWidget& window) {
   Faults faults;
   for (const QWidget* widget : visible<QWidget>(window)) {
     if (const int by = excess(*widget); by > 0) faults.push_back(called(*widget) + ": " + std::to_string(by) + " px");
+    if (const auto* bar = qobject_cast<const QStatusBar*>(widget); bar != nullptr && excess(*bar) > 0)
+      faults.back() += " of \"" + bar->currentMessage().toStdString() + "\"";
     // What does not fit into a bar of tools goes behind this button.
     if (widget->objectName() == "qt_toolbar_ext_button") faults.push_back("a bar of tools is too short");
   }
@@ -193,10 +195,11 @@ std::set<QString> texts(const QWidget& window) {
 // Texts with a word that are the same in both languages, and should not be.
 Faults untranslated(const std::set<QString>& english, const std::set<QString>& german) {
   const std::set<QString> same{"Osteon", "English", "Deutsch", "System", "Phantom – Osteon"};
-  const QRegularExpression word("[A-Za-z]{3}");
+  const QRegularExpression word("[A-Za-z]{3}"), quantity("^-?[0-9.,]+ \\S+$");
   Faults faults;
   for (const QString& text : german)
-    if (english.contains(text) && !same.contains(text) && text.contains(word)) faults.push_back(text.toStdString());
+    if (english.contains(text) && !same.contains(text) && text.contains(word) && !text.contains(quantity))
+      faults.push_back(text.toStdString());
   return faults;
 }
 

@@ -390,7 +390,7 @@
     </message>
     <message>
         <source>Hold the left button on the bone to push. The wheel sets the push, the right button turns the tool.</source>
-        <translation>Die linke Taste drückt auf den Knochen. Das Rad stellt den Andruck ein, die rechte Taste dreht das Werkzeug.</translation>
+        <translation>Die linke Taste drückt. Das Rad stellt den Andruck ein, die rechte Taste dreht das Werkzeug.</translation>
     </message>
     <message>
         <source>Click on the bone to place it there.</source>
