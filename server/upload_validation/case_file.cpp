@@ -213,11 +213,15 @@ Result<CheckedCase> unpack_case_file(const std::filesystem::path& program, const
   // It writes every byte twice: what was sent, and what it has read of that. A case shrinks by a third when it is
   // packed.
   const double expected = static_cast<double>(*bytes) * (1.0 + 2.0 * 1.5);
+  double done = 0.1;
   const auto stop = [&] {
     const double written = static_cast<double>(bytes_below(partial.path()));
-    return !keep_going(0.1 + 0.89 * std::clamp(written / std::max(1.0, expected), 0.0, 1.0));
+    done = std::max(done, 0.1 + 0.89 * std::clamp(written / std::max(1.0, expected), 0.0, 1.0));
+    return !keep_going(done);
   };
   Result<CheckedCase> checked = check_case(program, copy, partial.path(), quota, stop);
+  // Ctrl+C of a terminal ends the process too, which then seems to have died of the case.
+  if (!checked && !keep_going(done)) return stopped_while("unpacking " + file.string());
   if (!checked) return tl::unexpected(about_file(checked.error(), file, target, partial.path()));
   if (!keep_going(1.0)) return stopped_while("unpacking " + file.string());
   std::filesystem::rename(partial.path() / kSoundCase, target, error);

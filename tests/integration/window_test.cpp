@@ -367,11 +367,12 @@ TEST_F(WindowTest, ACaseInOneFileIsSavedOpenedAndDropped) {
   // Once more, with the mouse of a file manager: the same folder.
   QMimeData data;
   data.setUrls({QUrl::fromLocalFile(QString::fromStdString(file.string()))});
-  QDragEnterEvent enters(middle(), Qt::CopyAction, &data, Qt::LeftButton, Qt::NoModifier);
-  QApplication::sendEvent(window_.get(), &enters);
+  const QPoint at = view_->mapTo(window_.get(), middle());
+  QDragEnterEvent enters(at, Qt::CopyAction, &data, Qt::LeftButton, Qt::NoModifier);
+  QApplication::sendEvent(window_->windowHandle(), &enters);
   EXPECT_TRUE(enters.isAccepted());
-  QDropEvent drops(middle(), Qt::CopyAction, &data, Qt::LeftButton, Qt::NoModifier);
-  QApplication::sendEvent(window_.get(), &drops);
+  QDropEvent drops(at, Qt::CopyAction, &data, Qt::LeftButton, Qt::NoModifier);
+  QApplication::sendEvent(window_->windowHandle(), &drops);
   ASSERT_TRUE(until([&] { return !view_->surface_shown(); }));
   ASSERT_TRUE(until([&] { return view_->surface_shown(); })) << problem();
   ASSERT_EQ(others().size(), 1u);

@@ -255,7 +255,7 @@ TEST_F(CaseFileTest, OnlyPlainFilesAreRead) {
 TEST_F(CaseFileTest, WhoCancelsFindsNothing) {
   const std::filesystem::path file = packed();
   const auto names = names_in(temp_.path());
-  for (const double until : {0.0, 0.05, 0.5, 0.99}) {
+  for (const double until : {0.0, 0.05, 0.5, 0.995}) {
     const auto stops = [until](double fraction) { return fraction < until; };
     const auto out = unpack(file, case_file_quota(), stops);
     ASSERT_FALSE(out) << until;

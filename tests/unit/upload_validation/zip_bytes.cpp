@@ -9,7 +9,9 @@ namespace osteon::test {
 static_assert(kFileEntry == AE_IFREG && kFolderEntry == AE_IFDIR && kLinkEntry == AE_IFLNK);
 
 Bytes zip(const std::vector<Entry>& entries, const char* options) {
-  Bytes bytes(64 << 20);
+  std::size_t most = std::size_t{1} << 16;
+  for (const Entry& one : entries) most += 4 * one.path.size() + 2 * one.content.size() + 1024;
+  Bytes bytes(most);
   std::size_t used = 0;
   archive* a = archive_write_new();
   archive_write_set_format_zip(a);
