@@ -66,6 +66,14 @@ PointerSession::PointerSession(ReadyPlan plan, PointerExchange& exchange, const 
       device_(device),
       loop_(pointer_params(device.limits, force_scale, dt_s), plan_.tools) {
   near_.make_room(kMostContactPoints);
+  // Until the pointer first meets the bone, the tool waits above it, as a free hand's does. Others see it there.
+  const ReadyStep& step = plan_.steps[0];
+  hand_.target_mm = step.site.entry_mm - step.stand_off_mm * step.site.axis;
+  hand_.axis = step.site.axis;
+  rotation_ = step.rotation;
+  WorkspaceMapping mapping;
+  mapping.align(Eigen::Quaterniond::Identity(), 1.0, hand_.target_mm, hand_.target_mm);
+  loop_.take_up(held_, {hand_.target_mm, rotation_}, mapping);
 }
 
 void PointerSession::enter(PointerPhase phase) noexcept {

@@ -149,8 +149,10 @@ class WindowTest : public testing::Test {
   // Takes the drill and holds the button in the middle of the picture until bone goes.
   void drill() {
     click_tool("drill");
-    hover(middle());
-    ASSERT_TRUE(until([&] { return view_->pointer().on_bone(); }));
+    ASSERT_TRUE(until([&] {
+      hover(middle());
+      return view_->pointer().on_bone();
+    })) << problem();
     press(middle());
     EXPECT_TRUE(until([&] { return cut(); })) << problem();
   }
@@ -258,21 +260,22 @@ TEST_F(WindowTest, AKeptViewComesBack) {
 TEST_F(WindowTest, AnOpenedBoneIsPointedAtWhereItIsSeen) {
   open();
   click_tool("drill");
-  hover(middle() + QPoint(60, 0));
+  hover(middle() - QPoint(60, 0));
   EXPECT_TRUE(until([&] { return view_->pointer().on_bone(); }));
   auto* panel = window_->findChild<QWidget*>("clipping_panel");
   ASSERT_NE(panel, nullptr);
   panel->show();
-  // From above, with the front of the body below, the patient's left side is on the right.
+  // From above, with the front of the body up, the patient's left side is on the left.
   window_->findChild<QSlider*>("clip_left")->setValue(100);
   window_->findChild<QCheckBox*>("clip_box")->setChecked(true);
-  hover(middle() + QPoint(60, 0));
-  EXPECT_FALSE(view_->pointer().on_bone());
   hover(middle() - QPoint(60, 0));
+  EXPECT_FALSE(view_->pointer().on_bone());
+  hover(middle() + QPoint(60, 0));
   EXPECT_TRUE(view_->pointer().on_bone());
   QTest::mouseClick(window_->findChild<QPushButton*>("clip_whole"), Qt::LeftButton);
-  hover(middle() + QPoint(60, 0));
+  hover(middle() - QPoint(60, 0));
   EXPECT_TRUE(view_->pointer().on_bone());
+  panel->hide();  // the next window opens as this one was left
 }
 
 // In each of the two pictures the pointer finds the same place of the bone.

@@ -204,9 +204,10 @@ void MainWindow::make_view_menu() {
              std::function<void()> call) { return add_action(menu, words, name, keys, std::move(call), true); },
       [this](const QString& sentence) { say(sentence); }, this);
   view->addSeparator();
-  for (QDockWidget* panel : findChildren<QDockWidget*>()) view->addAction(panel->toggleViewAction());
+  QMenu* panels = view->addMenu(tr("Panels"));
+  for (QDockWidget* panel : findChildren<QDockWidget*>()) panels->addAction(panel->toggleViewAction());
   view->addSeparator();
-  fill_language_menu(*view->addMenu(tr("Lan&guage")), [this](const QString& sentence) { say(sentence); });
+  fill_language_menu(*view->addMenu(tr("La&nguage")), [this](const QString& sentence) { say(sentence); });
 }
 
 void MainWindow::make_tools_menu() {

@@ -26,22 +26,22 @@ QVariantList numbers_of(const CameraView& view) {
 
 ViewOptions::ViewOptions(BoneView& view, QMenu& menu, const Add& add, Say say, QObject* parent)
     : QObject(parent), view_(view), say_(std::move(say)) {
-  marker_ = add(&menu, tr("&Cube of the patient's sides"), "marker", QKeySequence("Ctrl+K"), [this] {
+  marker_ = add(&menu, tr("Cube of the patient's sides"), "marker", QKeySequence("Ctrl+K"), [this] {
     QSettings().setValue("view/marker", marker_->isChecked());
     view_.show_marker(marker_->isChecked());
   });
   marker_->setCheckable(true);
   marker_->setChecked(QSettings().value("view/marker", true).toBool());
   view_.show_marker(marker_->isChecked());
-  add_stereo(*menu.addMenu(tr("&Stereo")), add);
-  QMenu& kept = *menu.addMenu(tr("&Kept views"));
-  add(&kept, tr("&Keep this view"), "keep_view", QKeySequence("Ctrl+B"), [this] { keep_view(); });
-  add(&kept, tr("&Forget the kept views"), "forget_views", {}, [this] { forget_views(); });
+  add_stereo(*menu.addMenu(tr("Stereo picture")), add);
+  QMenu& kept = *menu.addMenu(tr("Kept views"));
+  add(&kept, tr("Keep this view"), "keep_view", QKeySequence("Ctrl+B"), [this] { keep_view(); });
+  add(&kept, tr("Forget the kept views"), "forget_views", {}, [this] { forget_views(); });
   kept.addSeparator();
   for (int number = 1; number <= kMostViews; ++number) {
     const QByteArray name = "view_" + QByteArray::number(number);
-    kept_.push_back(add(&kept, tr("View &%1").arg(number), name.constData(),
-                        QKeySequence(QString("Alt+%1").arg(number)), [this, number] { look(number); }));
+    kept_.push_back(add(&kept, tr("View %1").arg(number), name.constData(), QKeySequence(QString("Alt+%1").arg(number)),
+                        [this, number] { look(number); }));
   }
   refresh();
 }
@@ -54,11 +54,10 @@ void ViewOptions::add_stereo(QMenu& menu, const Add& add) {
     group->addAction(made);
     stereo_.push_back(made);
   };
-  choice(tr("&Off"), "stereo_off", QKeySequence("Ctrl+Alt+0"), StereoMode::off);
-  choice(tr("&Anaglyph, for red and cyan glasses"), "stereo_anaglyph", QKeySequence("Ctrl+Alt+1"),
-         StereoMode::anaglyph);
-  choice(tr("&Side by side"), "stereo_side_by_side", QKeySequence("Ctrl+Alt+2"), StereoMode::side_by_side);
-  choice(tr("&Quad buffer"), "stereo_quad_buffer", QKeySequence("Ctrl+Alt+3"), StereoMode::quad_buffer);
+  choice(tr("Off"), "stereo_off", QKeySequence("Ctrl+Alt+0"), StereoMode::off);
+  choice(tr("Anaglyph, for red and cyan glasses"), "stereo_anaglyph", QKeySequence("Ctrl+Alt+1"), StereoMode::anaglyph);
+  choice(tr("Side by side"), "stereo_side_by_side", QKeySequence("Ctrl+Alt+2"), StereoMode::side_by_side);
+  choice(tr("Quad buffer"), "stereo_quad_buffer", QKeySequence("Ctrl+Alt+3"), StereoMode::quad_buffer);
   stereo_.front()->setChecked(true);
 }
 

@@ -289,7 +289,7 @@
         <translation>Voll&amp;bild</translation>
     </message>
     <message>
-        <source>Lan&amp;guage</source>
+        <source>La&amp;nguage</source>
         <translation>&amp;Sprache</translation>
     </message>
     <message>
@@ -499,6 +499,10 @@
     <message>
         <source>You watch. The view follows the tool; a drag turns the bone, T follows again.</source>
         <translation>Sie schauen zu. Die Ansicht folgt dem Werkzeug; Ziehen dreht den Knochen, T folgt wieder.</translation>
+    </message>
+    <message>
+        <source>Panels</source>
+        <translation>Bereiche</translation>
     </message>
 </context>
 <context>
@@ -848,44 +852,44 @@
 <context>
     <name>ViewOptions</name>
     <message>
-        <source>&amp;Cube of the patient&apos;s sides</source>
-        <translation>&amp;Würfel mit den Seiten des Patienten</translation>
+        <source>Cube of the patient&apos;s sides</source>
+        <translation>Würfel mit den Seiten des Patienten</translation>
     </message>
     <message>
-        <source>&amp;Stereo</source>
-        <translation>&amp;Stereo</translation>
+        <source>Stereo picture</source>
+        <translation>Stereobild</translation>
     </message>
     <message>
-        <source>&amp;Kept views</source>
-        <translation>Gemer&amp;kte Ansichten</translation>
+        <source>Kept views</source>
+        <translation>Gemerkte Ansichten</translation>
     </message>
     <message>
-        <source>&amp;Keep this view</source>
-        <translation>Diese Ansicht &amp;merken</translation>
+        <source>Keep this view</source>
+        <translation>Diese Ansicht merken</translation>
     </message>
     <message>
-        <source>&amp;Forget the kept views</source>
-        <translation>Gemerkte Ansichten &amp;vergessen</translation>
+        <source>Forget the kept views</source>
+        <translation>Gemerkte Ansichten vergessen</translation>
     </message>
     <message>
-        <source>View &amp;%1</source>
-        <translation>Ansicht &amp;%1</translation>
+        <source>View %1</source>
+        <translation>Ansicht %1</translation>
     </message>
     <message>
-        <source>&amp;Off</source>
-        <translation>&amp;Aus</translation>
+        <source>Off</source>
+        <translation>Aus</translation>
     </message>
     <message>
-        <source>&amp;Anaglyph, for red and cyan glasses</source>
-        <translation>&amp;Anaglyph, für Rot-Cyan-Brillen</translation>
+        <source>Anaglyph, for red and cyan glasses</source>
+        <translation>Anaglyph, für Rot-Cyan-Brillen</translation>
     </message>
     <message>
-        <source>&amp;Side by side</source>
-        <translation>&amp;Nebeneinander</translation>
+        <source>Side by side</source>
+        <translation>Nebeneinander</translation>
     </message>
     <message>
-        <source>&amp;Quad buffer</source>
-        <translation>&amp;Quad-Buffer</translation>
+        <source>Quad buffer</source>
+        <translation>Quad-Buffer</translation>
     </message>
     <message>
         <source>This display has no quad buffer, so stereo is off. Choose anaglyph or side by side.</source>

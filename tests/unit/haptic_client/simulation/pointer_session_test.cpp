@@ -99,6 +99,23 @@ TEST_F(PointedHand, RestsAboveTheBoneAndCutsNothingThere) {
   EXPECT_GT(last.report.spindle_rpm, 500.0);
 }
 
+TEST_F(PointedHand, WaitsAboveTheBoneUntilThePointerMeetsIt) {
+  begin();
+  command_.on_bone = false;
+  const SessionTick last = run(300);
+  const Vec3 from_entry = last.report.pose_bone_proxy.position_mm - kAt_mm;
+  EXPECT_LT(depth(last), -2.0);
+  EXPECT_LT(from_entry.head<2>().norm(), 0.1);
+  EXPECT_LT(last.report.pose_bone_proxy.rotation.angularDistance(along(Vec3::UnitZ())), 1e-6);
+  EXPECT_EQ(last.report.spindle_rpm, 0.0);
+  EXPECT_EQ(removed(), 0.0);
+  // Then it comes from its height above the place that the pointer meets, as ever.
+  command_.on_bone = true;
+  run(1500);
+  EXPECT_EQ(session_->phase(), PointerPhase::rests);
+  EXPECT_EQ(removed(), 0.0);
+}
+
 TEST_F(PointedHand, PushesThroughBothWallsAndPlungesAsASimulatedSurgeonDoes) {
   // The surgeon with the same hand: how far beyond the bone the tip goes.
   Bench surgeon(bone_, {straight_down("drill-3.2")});
