@@ -284,11 +284,13 @@ void MainWindow::enable_room_actions(bool on) {
 // A sentence of another program may be longer than the bar. Then its tool tip has the rest.
 void MainWindow::say(const QString& sentence) {
   const int width = statusBar()->width();
-  int room = width;
-  for (const QLabel* label : {device_, position_, connection_})
-    if (label->isVisible() && !label->text().isEmpty()) room = std::min(room, label->x());
-  constexpr int kMargin_px = 60;              // the labels grow with what they say
-  if (room == width) room = width * 11 / 20;  // before they say anything
+  int room = width * 11 / 20;     // before the labels say anything
+  constexpr int kMargin_px = 60;  // they grow with what they say
+  if (!position_->text().isEmpty()) {
+    room = width;
+    for (const QLabel* label : {device_, position_, connection_})
+      if (label->isVisible() && !label->text().isEmpty()) room = std::min(room, label->x());
+  }
   const QString shown =
       statusBar()->fontMetrics().elidedText(sentence, Qt::ElideRight, std::max(kMargin_px, room - kMargin_px));
   statusBar()->setToolTip(sentence);
