@@ -70,7 +70,7 @@ PointerSession::PointerSession(ReadyPlan plan, PointerExchange& exchange, const 
   const ReadyStep& step = plan_.steps[0];
   hand_.target_mm = step.site.entry_mm - step.stand_off_mm * step.site.axis;
   hand_.axis = step.site.axis;
-  rotation_ = step.rotation;
+  rotation_ = pose_along(Vec3::Zero(), step.site.axis).rotation;
   WorkspaceMapping mapping;
   mapping.align(Eigen::Quaterniond::Identity(), 1.0, hand_.target_mm, hand_.target_mm);
   loop_.take_up(held_, {hand_.target_mm, rotation_}, mapping);

@@ -106,7 +106,7 @@ TEST_F(PointedHand, WaitsAboveTheBoneUntilThePointerMeetsIt) {
   const Vec3 from_entry = last.report.pose_bone_proxy.position_mm - kAt_mm;
   EXPECT_LT(depth(last), -2.0);
   EXPECT_LT(from_entry.head<2>().norm(), 0.1);
-  EXPECT_LT(last.report.pose_bone_proxy.rotation.angularDistance(along(Vec3::UnitZ())), 1e-6);
+  EXPECT_LT((last.report.pose_bone_proxy.rotation * Vec3::UnitZ() - Vec3::UnitZ()).norm(), 1e-6);
   EXPECT_EQ(last.report.spindle_rpm, 0.0);
   EXPECT_EQ(removed(), 0.0);
   // Then it comes from its height above the place that the pointer meets, as ever.
