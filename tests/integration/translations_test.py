@@ -106,7 +106,8 @@ class RulesCanFail(unittest.TestCase):
         self.assertEqual(completeness_faults(good, {}), ["A: \"Open\" is in no source any more"])
 
     def test_other_forms_are_noticed(self):
-        self.assertEqual(form_faults({("A", "&Move %1 <b>by %2</b>…"): ("Um <b>%2</b> %1 &bewegen…", "finished")}), [])
+        good = {("A", "&Move %1 <b>by %2</b>…"): ("Um <b>%2</b> %1 &bewegen…", "finished")}
+        self.assertEqual(form_faults(good), [])
         for source, german in (("%1 of %2", "%1 von %1"), ("&Open", "Öffnen"), ("Open…", "Öffnen"), (" N", "N"),
                                ("Open", "Öffnen…"), ("<b>a</b>", "<b>a"), ("Open", "Öff&nen"), ("a", "b...")):
             self.assertEqual(len(form_faults({("A", source): (german, "finished")})), 1, source)
