@@ -23,10 +23,7 @@ def tracked_files(root: Path):
 
 
 def width_faults(path: str, text: str):
-    """Lines that are too wide. Rows of Markdown tables, addresses, directives of HAProxy 2.6 and texts of Qt Linguist
-    cannot be broken."""
-    if path.endswith(".ts"):
-        return []
+    """Lines that are too wide. Rows of Markdown tables, addresses and directives of HAProxy 2.6 cannot be broken."""
     return [f"{path}:{number}: {len(line)} columns" for number, line in enumerate(text.splitlines(), 1)
             if len(line) > WIDEST and not (path.endswith(".md") and line.lstrip().startswith("|"))
             and not (path.endswith("haproxy.cfg") and line.lstrip()[0] != "#") and "https://" not in line]

@@ -281,7 +281,6 @@ class TheRules(unittest.TestCase):
         self.assertTrue(style.width_faults("a.cpp", wide))
         self.assertFalse(style.width_faults("a.cpp", "ö" * 120))
         self.assertFalse(style.width_faults("a.md", "| " + wide))
-        self.assertFalse(style.width_faults("a.ts", wide))
         self.assertTrue(style.cmake_faults("x/CMakeLists.txt", "  SOURCES a.cpp b.cpp"))
         self.assertFalse(style.cmake_faults("x/CMakeLists.txt", "  SOURCES a.cpp"))
         self.assertTrue(style.name_faults("a.cpp", "OldName old;", ["OldName"]))

@@ -88,7 +88,8 @@ GaugesPanel::GaugesPanel(QWidget* parent) : QWidget(parent) {
   all->addLayout(form);
   all->addWidget(plot_);
   auto* legend =
-      new QLabel(tr("<span style='color:#0072b2'>—</span> bone   <span style='color:#e69f00'>- -</span> hand"));
+      new QLabel(QString("<span style='color:#0072b2'>—</span> %1   <span style='color:#e69f00'>- -</span> %2")
+                     .arg(tr("bone"), tr("hand")));
   all->addWidget(legend);
   all->addStretch();
 }

@@ -562,7 +562,7 @@ void MainWindow::take_tool(const std::string& tool) {
     spindle_->setChecked(true);
     view_->pointer().set_spindle(true);
     properties_->show_push(view_->pointer().push_n());
-    say(tr("Hold the left button on the bone to push. The wheel sets the push, the right button turns the tool."));
+    say(tr("The left button pushes on the bone, the right one turns the tool. The wheel sets the push."));
   } else {
     placing_ = tool;
     view_->set_placing(true);
@@ -640,15 +640,25 @@ void MainWindow::save_picture() {
 }
 
 void MainWindow::show_help() {
-  QMessageBox::information(
-      this, tr("How to hold a tool"),
-      tr("<p><b>Choose a tool</b> in the left bar. A long click shows the other tools of its group.</p>"
-         "<p><b>Move the mouse</b> over the bone: the tool rests where the pointer is.<br>"
-         "<b>Hold the left button</b>: the hand pushes. <b>Wheel</b>: how hard it pushes.<br>"
-         "<b>Drag with the right button</b>: turns the tool; with Ctrl about its own axis.<br>"
-         "<b>Shift</b>: motions at a tenth. <b>Space</b>: spindle on or off. <b>Esc</b>: put the tool down.</p>"
-         "<p><b>Middle button</b>: turns the bone; with Shift it moves it. <b>Ctrl and wheel</b>: nearer or farther. "
-         "Beside the bone, and without a tool, the left button and the wheel do this too.</p>"));
+  struct Line {
+    QString input, effect;
+  };
+  const Line lines[] = {
+      {tr("Left bar"), tr("the tools; a long click shows the others of a group")},
+      {tr("Mouse over the bone"), tr("the tool rests where the pointer is")},
+      {tr("Left button, held"), tr("the hand pushes")},
+      {tr("Wheel"), tr("how hard the hand pushes")},
+      {tr("Right button, dragged"), tr("turns the tool; with Ctrl about its own axis")},
+      {tr("Shift"), tr("motions at a tenth")},
+      {tr("Space"), tr("spindle on or off")},
+      {tr("Escape"), tr("puts the tool down")},
+      {tr("Middle button"), tr("turns the bone; with Shift it moves it")},
+      {tr("Ctrl and wheel"), tr("nearer or farther")},
+      {tr("Beside the bone, or without a tool"), tr("the left button and the wheel move the view")},
+  };
+  QString text;
+  for (const Line& line : lines) text += QString("<p><b>%1</b>: %2</p>").arg(line.input, line.effect);
+  QMessageBox::information(this, tr("How to hold a tool"), text);
 }
 
 void MainWindow::refresh_gauges() {

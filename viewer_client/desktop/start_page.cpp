@@ -110,7 +110,7 @@ QVBoxLayout* StartPage::make_buttons() {
   add(tr("&Import a CT…"), "import",
       tr("Make a case from a folder of DICOM files, a zip or ISO file, NIfTI, NRRD or MetaImage"),
       &events_.import_scan);
-  add(tr("&Open a case…"), "open", tr("Open an .osteon file, or the case.json of a case's folder"), &events_.open_case);
+  add(tr("&Open a case…"), "open", tr("Open an .osteon file, or the case.json of a folder"), &events_.open_case);
   add(tr("&Join a room…"), "join", tr("Join a room on a server, with certificate and ticket"), &events_.join_room);
   column->addStretch();
   return column;

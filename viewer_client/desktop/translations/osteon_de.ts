@@ -97,10 +97,6 @@
         <translation>Dichte</translation>
     </message>
     <message>
-        <source>&lt;span style=&apos;color:#0072b2&apos;&gt;—&lt;/span&gt; bone   &lt;span style=&apos;color:#e69f00&apos;&gt;- -&lt;/span&gt; hand</source>
-        <translation>&lt;span style=&apos;color:#0072b2&apos;&gt;—&lt;/span&gt; Knochen   &lt;span style=&apos;color:#e69f00&apos;&gt;- -&lt;/span&gt; Hand</translation>
-    </message>
-    <message>
         <source>%1 N</source>
         <translation>%1 N</translation>
     </message>
@@ -124,12 +120,20 @@
         <source>%1 g/cm³</source>
         <translation>%1 g/cm³</translation>
     </message>
+    <message>
+        <source>bone</source>
+        <translation>Knochen</translation>
+    </message>
+    <message>
+        <source>hand</source>
+        <translation>Hand</translation>
+    </message>
 </context>
 <context>
     <name>ImporterRun</name>
     <message>
         <source>Cannot make the folder %1. Choose a place where you may write.</source>
-        <translation>Der Ordner %1 kann nicht angelegt werden. Wählen Sie einen Ort, an dem Sie schreiben dürfen.</translation>
+        <translation>Der Ordner %1 kann nicht angelegt werden. Wählen Sie einen beschreibbaren Ort.</translation>
     </message>
     <message>
         <source>osteon-import is not installed. Install the package osteon-import.</source>
@@ -326,7 +330,7 @@
     </message>
     <message>
         <source>Osteon %1 simulates bone surgery. It is for research and teaching. It is not a medical device.</source>
-        <translation>Osteon %1 simuliert Knochenchirurgie. Es dient Forschung und Lehre. Es ist kein Medizinprodukt.</translation>
+        <translation>Osteon %1 simuliert Knochenchirurgie für Forschung und Lehre. Kein Medizinprodukt.</translation>
     </message>
     <message>
         <source>Actions</source>
@@ -389,10 +393,6 @@
         <translation>Wählen Sie links ein Werkzeug, dann halten Sie die linke Taste auf dem Knochen.</translation>
     </message>
     <message>
-        <source>Hold the left button on the bone to push. The wheel sets the push, the right button turns the tool.</source>
-        <translation>Die linke Taste drückt. Das Rad stellt den Andruck ein, die rechte Taste dreht das Werkzeug.</translation>
-    </message>
-    <message>
         <source>Click on the bone to place it there.</source>
         <translation>Klicken Sie auf die Stelle des Knochens.</translation>
     </message>
@@ -431,10 +431,6 @@
     <message>
         <source>How to hold a tool</source>
         <translation>So halten Sie ein Werkzeug</translation>
-    </message>
-    <message>
-        <source>&lt;p&gt;&lt;b&gt;Choose a tool&lt;/b&gt; in the left bar. A long click shows the other tools of its group.&lt;/p&gt;&lt;p&gt;&lt;b&gt;Move the mouse&lt;/b&gt; over the bone: the tool rests where the pointer is.&lt;br&gt;&lt;b&gt;Hold the left button&lt;/b&gt;: the hand pushes. &lt;b&gt;Wheel&lt;/b&gt;: how hard it pushes.&lt;br&gt;&lt;b&gt;Drag with the right button&lt;/b&gt;: turns the tool; with Ctrl about its own axis.&lt;br&gt;&lt;b&gt;Shift&lt;/b&gt;: motions at a tenth. &lt;b&gt;Space&lt;/b&gt;: spindle on or off. &lt;b&gt;Esc&lt;/b&gt;: put the tool down.&lt;/p&gt;&lt;p&gt;&lt;b&gt;Middle button&lt;/b&gt;: turns the bone; with Shift it moves it. &lt;b&gt;Ctrl and wheel&lt;/b&gt;: nearer or farther. Beside the bone, and without a tool, the left button and the wheel do this too.&lt;/p&gt;</source>
-        <translation>&lt;p&gt;&lt;b&gt;Wählen Sie ein Werkzeug&lt;/b&gt; in der linken Leiste. Ein langer Klick zeigt die anderen Werkzeuge der Gruppe.&lt;/p&gt;&lt;p&gt;&lt;b&gt;Bewegen Sie die Maus&lt;/b&gt; über den Knochen: Das Werkzeug liegt dort auf, wo der Zeiger ist.&lt;br&gt;&lt;b&gt;Linke Taste halten&lt;/b&gt;: Die Hand drückt. &lt;b&gt;Rad&lt;/b&gt;: wie stark sie drückt.&lt;br&gt;&lt;b&gt;Mit der rechten Taste ziehen&lt;/b&gt;: dreht das Werkzeug, mit Strg um seine eigene Achse.&lt;br&gt;&lt;b&gt;Umschalt&lt;/b&gt;: ein Zehntel der Bewegung. &lt;b&gt;Leertaste&lt;/b&gt;: Antrieb ein oder aus. &lt;b&gt;Esc&lt;/b&gt;: Werkzeug ablegen.&lt;/p&gt;&lt;p&gt;&lt;b&gt;Mittlere Taste&lt;/b&gt;: dreht den Knochen, mit Umschalt verschiebt sie ihn. &lt;b&gt;Strg und Rad&lt;/b&gt;: näher oder ferner. Neben dem Knochen und ohne Werkzeug tun die linke Taste und das Rad dasselbe.&lt;/p&gt;</translation>
     </message>
     <message>
         <source>Connection lost, trying again</source>
@@ -498,18 +494,110 @@
     </message>
     <message>
         <source>You watch. The view follows the tool; a drag turns the bone, T follows again.</source>
-        <translation>Sie schauen zu. Die Ansicht folgt dem Werkzeug; Ziehen dreht den Knochen, T folgt wieder.</translation>
+        <translation>Sie schauen zu. Die Ansicht folgt dem Werkzeug; Ziehen löst sie, T folgt wieder.</translation>
     </message>
     <message>
         <source>Panels</source>
         <translation>Bereiche</translation>
+    </message>
+    <message>
+        <source>The left button pushes on the bone, the right one turns the tool. The wheel sets the push.</source>
+        <translation>Linke Taste drückt, rechte dreht das Werkzeug. Das Rad stellt den Andruck ein.</translation>
+    </message>
+    <message>
+        <source>Left bar</source>
+        <translation>Linke Leiste</translation>
+    </message>
+    <message>
+        <source>the tools; a long click shows the others of a group</source>
+        <translation>die Werkzeuge; ein langer Klick zeigt die anderen der Gruppe</translation>
+    </message>
+    <message>
+        <source>Mouse over the bone</source>
+        <translation>Maus über dem Knochen</translation>
+    </message>
+    <message>
+        <source>the tool rests where the pointer is</source>
+        <translation>Das Werkzeug liegt dort auf, wo der Zeiger ist</translation>
+    </message>
+    <message>
+        <source>Left button, held</source>
+        <translation>Linke Taste halten</translation>
+    </message>
+    <message>
+        <source>the hand pushes</source>
+        <translation>Die Hand drückt</translation>
+    </message>
+    <message>
+        <source>Wheel</source>
+        <translation>Rad</translation>
+    </message>
+    <message>
+        <source>how hard the hand pushes</source>
+        <translation>wie stark die Hand drückt</translation>
+    </message>
+    <message>
+        <source>Right button, dragged</source>
+        <translation>Mit der rechten Taste ziehen</translation>
+    </message>
+    <message>
+        <source>turns the tool; with Ctrl about its own axis</source>
+        <translation>dreht das Werkzeug, mit Strg um seine eigene Achse</translation>
+    </message>
+    <message>
+        <source>Shift</source>
+        <translation>Umschalt</translation>
+    </message>
+    <message>
+        <source>motions at a tenth</source>
+        <translation>ein Zehntel der Bewegung</translation>
+    </message>
+    <message>
+        <source>Space</source>
+        <translation>Leertaste</translation>
+    </message>
+    <message>
+        <source>spindle on or off</source>
+        <translation>Antrieb ein oder aus</translation>
+    </message>
+    <message>
+        <source>Escape</source>
+        <translation>Esc</translation>
+    </message>
+    <message>
+        <source>puts the tool down</source>
+        <translation>legt das Werkzeug ab</translation>
+    </message>
+    <message>
+        <source>Middle button</source>
+        <translation>Mittlere Taste</translation>
+    </message>
+    <message>
+        <source>turns the bone; with Shift it moves it</source>
+        <translation>dreht den Knochen, mit Umschalt verschiebt sie ihn</translation>
+    </message>
+    <message>
+        <source>Ctrl and wheel</source>
+        <translation>Strg und Rad</translation>
+    </message>
+    <message>
+        <source>nearer or farther</source>
+        <translation>näher oder ferner</translation>
+    </message>
+    <message>
+        <source>Beside the bone, or without a tool</source>
+        <translation>Neben dem Knochen oder ohne Werkzeug</translation>
+    </message>
+    <message>
+        <source>the left button and the wheel move the view</source>
+        <translation>Linke Taste und Rad bewegen die Ansicht</translation>
     </message>
 </context>
 <context>
     <name>PracticeRoom</name>
     <message>
         <source>Cannot make the folder %1. Choose a place where you may write.</source>
-        <translation>Der Ordner %1 lässt sich nicht anlegen. Wählen Sie einen Ort, an dem Sie schreiben dürfen.</translation>
+        <translation>Der Ordner %1 kann nicht angelegt werden. Wählen Sie einen beschreibbaren Ort.</translation>
     </message>
     <message>
         <source>osteon-server is not installed. Install the package osteon-server.</source>
@@ -671,7 +759,7 @@
     </message>
     <message>
         <source>Make a case from a folder of DICOM files, a zip or ISO file, NIfTI, NRRD or MetaImage</source>
-        <translation>Erzeugt einen Fall aus einem Ordner mit DICOM-Dateien, einer Zip- oder ISO-Datei, NIfTI, NRRD oder MetaImage</translation>
+        <translation>Erzeugt einen Fall aus DICOM (Ordner, Zip, ISO), NIfTI, NRRD oder MetaImage</translation>
     </message>
     <message>
         <source>&amp;Open a case…</source>
@@ -686,8 +774,8 @@
         <translation>Tritt einem Raum auf einem Server bei, mit Zertifikat und Ticket</translation>
     </message>
     <message>
-        <source>Open an .osteon file, or the case.json of a case&apos;s folder</source>
-        <translation>Öffnet eine .osteon-Datei oder die case.json im Ordner eines Falls</translation>
+        <source>Open an .osteon file, or the case.json of a folder</source>
+        <translation>Öffnet eine .osteon-Datei oder die case.json eines Ordners</translation>
     </message>
 </context>
 <context>
@@ -893,7 +981,7 @@
     </message>
     <message>
         <source>This display has no quad buffer, so stereo is off. Choose anaglyph or side by side.</source>
-        <translation>Dieser Bildschirm hat keinen Quad-Buffer, deshalb ist Stereo aus. Wählen Sie Anaglyph oder Nebeneinander.</translation>
+        <translation>Kein Quad-Buffer, deshalb ist Stereo aus. Wählen Sie Anaglyph oder Nebeneinander.</translation>
     </message>
     <message>
         <source>Nine views are kept already. Forget them first.</source>
