@@ -87,9 +87,8 @@ GaugesPanel::GaugesPanel(QWidget* parent) : QWidget(parent) {
   auto* all = new QVBoxLayout(this);
   all->addLayout(form);
   all->addWidget(plot_);
-  auto* legend =
-      new QLabel(QString("<span style='color:#0072b2'>—</span> %1   <span style='color:#e69f00'>- -</span> %2")
-                     .arg(tr("bone"), tr("hand")));
+  const QString colours = "<span style='color:#0072b2'>—</span> %1   <span style='color:#e69f00'>- -</span> %2";
+  auto* legend = new QLabel(colours.arg(tr("bone"), tr("hand")));
   all->addWidget(legend);
   all->addStretch();
 }
