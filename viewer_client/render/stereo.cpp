@@ -1,9 +1,7 @@
 #include "viewer_client/render/stereo.hpp"
 
 #include <vtkCamera.h>
-#include <vtkLightCollection.h>
 #include <vtkNew.h>
-#include <vtkProp.h>
 #include <vtkProp3D.h>
 #include <vtkPropCollection.h>
 #include <vtkRenderWindow.h>
