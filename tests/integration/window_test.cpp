@@ -25,6 +25,7 @@
 #include <QWindow>
 #include <algorithm>
 #include <chrono>
+#include <cstdlib>
 #include <fstream>
 #include <memory>
 #include <sstream>
@@ -34,6 +35,7 @@
 #include "tests/integration/desk.hpp"
 #include "viewer_client/desktop/bone_view.hpp"
 #include "viewer_client/desktop/main_window.hpp"
+#include "viewer_client/desktop/sound_dialog.hpp"
 #include "viewer_client/desktop/start_page.hpp"
 
 namespace osteon {
@@ -61,7 +63,12 @@ std::vector<pid_t> children(const std::string& program) {
 
 class WindowTest : public testing::Test {
  protected:
-  static void SetUpTestSuite() { desk_ = std::make_unique<Desk>(); }
+  static void SetUpTestSuite() {
+    desk_ = std::make_unique<Desk>();
+    // Only deploy/with-null-sink brings a sound server. Nobody listens in this folder.
+    if (!has_sound()) ::setenv("PULSE_SERVER", ("unix:" + (desk_->temp() / "nobody").string()).c_str(), 1);
+  }
+  static bool has_sound() { return std::getenv("OSTEON_TEST_SOUND") != nullptr; }
   static void TearDownTestSuite() { desk_.reset(); }
 
   void SetUp() override {
@@ -293,6 +300,69 @@ TEST_F(WindowTest, APointerIsInEitherPictureSideBySide) {
   trigger("stereo_quad_buffer");
   EXPECT_TRUE(window_->statusBar()->currentMessage().contains("quad buffer"));
   EXPECT_TRUE(window_->findChild<QAction*>("stereo_off")->isChecked());
+}
+
+// The drill is heard while it turns, as loud as the slider says. Without a sound server the dialog says so. Both are
+// run: integration.window has none, and integration.window_sound has one.
+TEST_F(WindowTest, TheSoundDialogSetsTheVolumeAndShowsWhatIsPlayed) {
+  open();
+  trigger("sound_settings");
+  auto* dialog = window_->findChild<SoundDialog*>("sound_dialog");
+  ASSERT_NE(dialog, nullptr);
+  EXPECT_TRUE(dialog->isVisible());
+  const auto* plot = dialog->findChild<WavePlot*>("wave");
+  const auto* trouble = dialog->findChild<QLabel*>("sound_trouble");
+  auto* volume = dialog->findChild<QSlider*>("volume");
+  auto* on = dialog->findChild<QCheckBox*>("sound_on");
+  const auto loudest = [&] {
+    int most = 0;
+    for (const int sample : plot->wave()) most = std::max(most, std::abs(sample));
+    return most;
+  };
+  click_tool("drill");
+  hover(middle());
+  if (has_sound()) {
+    ASSERT_TRUE(until([&] { return loudest() > 100; })) << trouble->text().toStdString() << problem();
+    EXPECT_EQ(trouble->text(), QString());
+    EXPECT_EQ(label("sound_device"), "PulseAudio");
+    EXPECT_TRUE(label("sound_work").endsWith(" ms")) << label("sound_work").toStdString();
+    QTest::keyClick(volume, Qt::Key_Home);
+    EXPECT_TRUE(until([&] { return loudest() == 0 && !plot->wave().empty(); }));
+    QTest::keyClick(volume, Qt::Key_End);
+    EXPECT_TRUE(until([&] { return loudest() > 100; }));
+    QTest::keyClick(on, Qt::Key_Space);
+    EXPECT_TRUE(until([&] { return loudest() == 0 && !plot->wave().empty(); }));
+    QTest::keyClick(on, Qt::Key_Space);
+    EXPECT_TRUE(until([&] { return loudest() > 100; }));
+  } else {
+    ASSERT_TRUE(until([&] { return trouble->text().startsWith("No sound device: "); })) << problem();
+    EXPECT_EQ(loudest(), 0);
+    EXPECT_TRUE(children("osteon-audio").size() == 1) << "it waits for a device";
+  }
+  // Escape closes the dialog, and the tool stays in the hand.
+  QTest::keyClick(dialog, Qt::Key_Escape);
+  EXPECT_FALSE(dialog->isVisible());
+  EXPECT_TRUE(view_->holding());
+}
+
+TEST_F(WindowTest, VolumeAndOffAreThereAtTheNextStart) {
+  const auto open_dialog = [&] {
+    trigger("sound_settings");
+    return window_->findChild<SoundDialog*>("sound_dialog");
+  };
+  const auto* dialog = open_dialog();
+  dialog->findChild<QSlider*>("volume")->setValue(40);
+  QTest::keyClick(dialog->findChild<QCheckBox*>("sound_on"), Qt::Key_Space);
+  EXPECT_FALSE(window_->findChild<QAction*>("sound")->isChecked()) << "the menu shows the same";
+  window_ = std::make_unique<MainWindow>();
+  show();
+  EXPECT_FALSE(window_->findChild<QAction*>("sound")->isChecked());
+  dialog = open_dialog();
+  auto* volume = dialog->findChild<QSlider*>("volume");
+  EXPECT_EQ(volume->value(), 40);
+  trigger("sound");
+  EXPECT_TRUE(dialog->findChild<QCheckBox*>("sound_on")->isChecked()) << "the dialog shows the same";
+  volume->setValue(100);  // for the next window
 }
 
 TEST_F(WindowTest, AKilledHapticClientComesBackAndCutsAgain) {

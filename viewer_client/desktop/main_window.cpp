@@ -34,6 +34,7 @@
 #include "viewer_client/desktop/language.hpp"
 #include "viewer_client/desktop/menu_keys.hpp"
 #include "viewer_client/desktop/properties_panel.hpp"
+#include "viewer_client/desktop/sound_control.hpp"
 #include "viewer_client/desktop/start_page.hpp"
 #include "viewer_client/desktop/tool_bar.hpp"
 #include "viewer_client/desktop/tool_names.hpp"
@@ -226,12 +227,18 @@ void MainWindow::make_tools_menu() {
   spindle_->setCheckable(true);
   sound_ = add_action(
       tools, tr("S&ound"), "sound", QKeySequence("Ctrl+Shift+S"),
-      [this] {
-        if (practice_) practice_->set_sound(sound_->isChecked());
-      },
-      true);
+      [this] { sound_control_->set_on(sound_->isChecked()); }, false);
+  sound_control_ = new SoundControl({[this](bool on) {
+                                       sound_->setChecked(on);
+                                       if (on && practice_) practice_->want_sound();
+                                     },
+                                     [this](const QString& sentence) { say(sentence); }},
+                                    this);
   sound_->setCheckable(true);
-  sound_->setChecked(true);
+  sound_->setChecked(sound_control_->on());
+  add_action(
+      tools, tr("&Volume and wave form…"), "sound_settings", QKeySequence("Ctrl+Shift+V"),
+      [this] { sound_control_->show_dialog(); }, false);
 }
 
 void MainWindow::make_help_menu() {
@@ -451,6 +458,10 @@ void MainWindow::practise(const std::filesystem::path& bone, const std::filesyst
   auto pointer = PointerServer::listen(options.pointer);
   if (!pointer) return room_ended(QString::fromStdString(pointer.error().message));
   pointer_ = std::move(*pointer);
+  options.sound_socket =
+      (runtime + "/osteon-sound-" + QString::number(QCoreApplication::applicationPid())).toStdString();
+  if (const auto sound = sound_control_->listen(options.sound_socket); !sound)
+    return room_ended(QString::fromStdString(sound.error().message));
   const QString title = name.isEmpty() ? case_title(bone) : name;
   opened_ = RecentEntry{tr("%1, %2").arg(title, QLocale().toString(QDateTime::currentDateTime(), QLocale::ShortFormat)),
                         bone, options.folder};
@@ -534,6 +545,7 @@ void MainWindow::leave_room() {
   room_.reset();
   practice_.reset();
   pointer_.reset();
+  sound_control_->close();
   opened_.reset();
   set_watching(false);
   enable_room_actions(false);
@@ -664,6 +676,7 @@ void MainWindow::show_help() {
 void MainWindow::refresh_gauges() {
   if (!room_) return;
   if (const auto failed = room_->failure_seen()) return room_ended(QString::fromStdString(failed->message));
+  sound_control_->refresh();
   connection_->setText(room_->interrupted() ? tr("Connection lost, trying again")
                                             : tr("Connected to %1").arg(address_));
   const std::optional<PointerOutput> hand = pointer_ ? pointer_->newest() : std::nullopt;

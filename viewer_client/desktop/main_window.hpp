@@ -27,6 +27,7 @@ class BoneView;
 class ClippingPanel;
 class GaugesPanel;
 class PropertiesPanel;
+class SoundControl;
 class StartPage;
 class SurgeryToolBar;
 class ViewOptions;
@@ -114,6 +115,7 @@ class MainWindow : public QMainWindow {
   PropertiesPanel* properties_ = nullptr;
   ClippingPanel* clipping_ = nullptr;
   ViewOptions* view_options_ = nullptr;
+  SoundControl* sound_control_ = nullptr;
   QLabel *position_ = nullptr, *device_ = nullptr, *connection_ = nullptr;
   std::vector<QAction*> room_actions_;
   QAction *sound_ = nullptr, *spindle_ = nullptr;

@@ -96,14 +96,14 @@ void PracticeRoom::start_haptic() {
 void PracticeRoom::start_audio() {
   audio_ = std::make_unique<ChildProcess>(log_file("osteon-audio"));
   connect(audio_.get(), QOverload<int, QProcess::ExitStatus>::of(&QProcess::finished), this, [this] { audio_ended(); });
-  audio_->start(program_path("osteon-audio"),
-                {"--server", address_, "--plain", "--output", "pulse", "--timeout", "60"});
+  audio_->start(program_path("osteon-audio"), {"--server", address_, "--plain", "--output", "pulse", "--window",
+                                               text_of(options_.sound_socket), "--timeout", "60"});
+  QTimer::singleShot(kSettled_ms, audio_.get(), [this] { audio_deaths_ = 0; });
 }
 
-void PracticeRoom::set_sound(bool on) {
-  options_.sound = on;
-  if (!on) audio_.reset();
-  if (on && !audio_ && !address_.isEmpty()) start_audio();
+void PracticeRoom::want_sound() {
+  options_.sound = true;
+  if (!audio_ && !address_.isEmpty()) start_audio();
 }
 
 void PracticeRoom::server_ended() {
@@ -124,8 +124,9 @@ void PracticeRoom::haptic_ended() {
 }
 
 void PracticeRoom::audio_ended() {
-  if (over_ || !options_.sound) return;
-  events_.notice(tr("There is no sound: %1").arg(audio_->last_sentence()));
+  if (over_) return;
+  if (++audio_deaths_ >= kMostDeaths) return events_.notice(tr("There is no sound: %1").arg(audio_->last_sentence()));
+  QTimer::singleShot(kRestart_ms, this, [this] { start_audio(); });
 }
 
 }  // namespace osteon

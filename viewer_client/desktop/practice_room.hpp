@@ -18,7 +18,8 @@ struct PracticeOptions {
   std::filesystem::path folder;   // of the session: journal, logs. It is made if it is missing.
   std::filesystem::path cache;    // where the haptic client keeps cases
   std::filesystem::path pointer;  // socket of the window's pointer
-  QString tool;                   // that the hand holds first
+  std::filesystem::path sound_socket;
+  QString tool;  // that the hand holds first
   bool sound = true;
 };
 
@@ -37,7 +38,8 @@ class PracticeRoom : public QObject {
   ~PracticeRoom() override;  // ends the clients first, then the server
 
   void start();
-  void set_sound(bool on);
+  // Starts the audio client when the sound is wanted for the first time. Its socket switches it off and on again.
+  void want_sound();
 
  private:
   void start_server();
@@ -56,7 +58,7 @@ class PracticeRoom : public QObject {
   QTimer address_timer_;
   QString address_;
   // of children that died soon after their start, one after the other
-  int server_deaths_ = 0, haptic_deaths_ = 0;
+  int server_deaths_ = 0, haptic_deaths_ = 0, audio_deaths_ = 0;
   bool over_ = false;
   std::unique_ptr<ChildProcess> server_, haptic_, audio_;
 };

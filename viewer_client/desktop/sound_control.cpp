@@ -11,7 +11,8 @@ constexpr const char* kOnKey = "sound/on";
 constexpr const char* kVolumeKey = "sound/volume";  // percent
 }  // namespace
 
-SoundControl::SoundControl(Events events, QWidget* window) : events_(std::move(events)), window_(window) {
+SoundControl::SoundControl(Events events, QWidget* window)
+    : QObject(window), events_(std::move(events)), window_(window) {
   const QSettings settings;
   chosen_.on = settings.value(kOnKey, true).toBool();
   chosen_.percent = std::clamp(settings.value(kVolumeKey, 100).toInt(), 0, 100);
@@ -67,9 +68,12 @@ void SoundControl::refresh() {
     if (!trouble_.empty() && chosen_.on)
       events_.notice(tr("There is no sound: %1").arg(QString::fromStdString(trouble_)));
   }
-  if (dialog_ != nullptr && dialog_->isVisible())
-    dialog_->show_report(heard, server_ ? tr("The audio client has not said anything yet.")
-                                        : tr("There is sound in a room to practise in. Open a bone first."));
+  if (dialog_ != nullptr && dialog_->isVisible()) dialog_->show_report(heard, missing());
+}
+
+QString SoundControl::missing() const {
+  if (!server_) return tr("There is sound in a room to practise in. Open a bone first.");
+  return chosen_.on ? tr("The audio client has not said anything yet.") : tr("The sound is off.");
 }
 
 std::optional<SoundReport> SoundControl::report() { return server_ ? server_->newest() : std::nullopt; }

@@ -22,7 +22,7 @@ class SoundControl : public QObject {
     std::function<void(const QString& sentence)> notice;  // the device went away
   };
   // With what was chosen last. `window`: the dialog's parent.
-  SoundControl(Events events, QWidget* window);
+  SoundControl(Events events, QWidget* window);  // owned by the window
 
   // Makes the socket for the audio client of the next room. Errors: those of SoundServer::listen().
   [[nodiscard]] Result<void> listen(const std::filesystem::path& socket);
@@ -38,6 +38,7 @@ class SoundControl : public QObject {
  private:
   void choose(const SoundDialog::Chosen& chosen);
   void send();
+  [[nodiscard]] QString missing() const;  // why there is no report
 
   Events events_;
   QWidget* window_;

@@ -135,8 +135,7 @@ void SoundDialog::show_report(const std::optional<SoundReport>& report, const QS
     const double db = 20.0 * std::log10(std::max(report->level, 1e-9));
     return db < kQuietest_db ? tr("silent") : tr("%1 dB").arg(decimals(db, 0));
   });
-  text(work_,
-       [&] { return tr("%1 of %2 ms").arg(decimals(report->work_ms, 2), decimals(report->buffer_ms, 2)); });
+  text(work_, [&] { return tr("%1 of %2 ms").arg(decimals(report->work_ms, 2), decimals(report->buffer_ms, 2)); });
   text(latency_, [&] { return tr("%1 ms").arg(decimals(report->latency_ms, 1)); });
   text(gaps_, [&] { return QLocale().toString(static_cast<qlonglong>(report->gaps)); });
   text(device_, [&] { return QString::fromStdString(report->device); });

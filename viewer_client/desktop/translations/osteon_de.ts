@@ -592,6 +592,10 @@
         <source>the left button and the wheel move the view</source>
         <translation>Linke Taste und Rad bewegen die Ansicht</translation>
     </message>
+    <message>
+        <source>&amp;Volume and wave form…</source>
+        <translation>&amp;Lautstärke und Wellenform…</translation>
+    </message>
 </context>
 <context>
     <name>PracticeRoom</name>
@@ -721,6 +725,92 @@
     <message>
         <source>%1 N</source>
         <translation>%1 N</translation>
+    </message>
+</context>
+<context>
+    <name>SoundControl</name>
+    <message>
+        <source>There is no sound: %1</source>
+        <translation>Es gibt keinen Ton: %1</translation>
+    </message>
+    <message>
+        <source>There is sound in a room to practise in. Open a bone first.</source>
+        <translation>Ton gibt es in einem Übungsraum. Öffnen Sie zuerst einen Knochen.</translation>
+    </message>
+    <message>
+        <source>The audio client has not said anything yet.</source>
+        <translation>Das Tonprogramm hat sich noch nicht gemeldet.</translation>
+    </message>
+    <message>
+        <source>The sound is off.</source>
+        <translation>Der Ton ist aus.</translation>
+    </message>
+</context>
+<context>
+    <name>SoundDialog</name>
+    <message>
+        <source>Sound</source>
+        <translation>Ton</translation>
+    </message>
+    <message>
+        <source>&amp;Play the sound</source>
+        <translation>Ton &amp;abspielen</translation>
+    </message>
+    <message>
+        <source>Volume</source>
+        <translation>Lautstärke</translation>
+    </message>
+    <message>
+        <source>%1 %</source>
+        <translation>%1 %</translation>
+    </message>
+    <message>
+        <source>&amp;Volume</source>
+        <translation>&amp;Lautstärke</translation>
+    </message>
+    <message>
+        <source>Level</source>
+        <translation>Pegel</translation>
+    </message>
+    <message>
+        <source>Computing time of a buffer</source>
+        <translation>Rechenzeit je Puffer</translation>
+    </message>
+    <message>
+        <source>From the tool to the ear, at most</source>
+        <translation>Vom Werkzeug zum Ohr, höchstens</translation>
+    </message>
+    <message>
+        <source>Gaps</source>
+        <translation>Aussetzer</translation>
+    </message>
+    <message>
+        <source>Device</source>
+        <translation>Gerät</translation>
+    </message>
+    <message>
+        <source>Close</source>
+        <translation>Schließen</translation>
+    </message>
+    <message>
+        <source>silent</source>
+        <translation>still</translation>
+    </message>
+    <message>
+        <source>%1 dB</source>
+        <translation>%1 dB</translation>
+    </message>
+    <message>
+        <source>%1 of %2 ms</source>
+        <translation>%1 von %2 ms</translation>
+    </message>
+    <message>
+        <source>%1 ms</source>
+        <translation>%1 ms</translation>
+    </message>
+    <message>
+        <source>No sound device: %1</source>
+        <translation>Kein Tongerät: %1</translation>
     </message>
 </context>
 <context>
@@ -990,6 +1080,17 @@
     <message>
         <source>Kept as view %1.</source>
         <translation>Als Ansicht %1 gemerkt.</translation>
+    </message>
+</context>
+<context>
+    <name>WavePlot</name>
+    <message>
+        <source>Wave form of the sound</source>
+        <translation>Wellenform des Tons</translation>
+    </message>
+    <message>
+        <source>%1 ms</source>
+        <translation>%1 ms</translation>
     </message>
 </context>
 </TS>
