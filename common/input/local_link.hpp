@@ -1,6 +1,7 @@
 // A local socket between a window and a client that it starts, both of one user. Each message is one packet of text.
 // The newest message counts, so neither end ever waits.
 #pragma once
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
@@ -103,6 +104,11 @@ class LinkServer {
     attend();
     return link_->connected();
   }
+  // Since the newest message came. None: as of newest().
+  [[nodiscard]] std::optional<std::chrono::duration<double, std::milli>> silence() const {
+    if (!newest_) return std::nullopt;
+    return std::chrono::steady_clock::now() - heard_at_;
+  }
   [[nodiscard]] std::uint64_t refused() const { return refused_; }  // messages that could not be read
 
  private:
@@ -114,12 +120,14 @@ class LinkServer {
         newest_ = std::move(*message);
       else
         ++refused_;
+      heard_at_ = std::chrono::steady_clock::now();
     });
     if (!link_->connected()) newest_.reset();
   }
 
   std::unique_ptr<LocalServer> link_;
   std::optional<Heard> newest_;
+  std::chrono::steady_clock::time_point heard_at_;
   std::uint64_t refused_ = 0;
 };
 

@@ -8,12 +8,14 @@
 #include <QCheckBox>
 #include <QComboBox>
 #include <QCursor>
+#include <QDockWidget>
 #include <QDropEvent>
 #include <QLabel>
 #include <QListWidget>
 #include <QMenu>
 #include <QMimeData>
 #include <QPushButton>
+#include <QSettings>
 #include <QSlider>
 #include <QSpinBox>
 #include <QStackedWidget>
@@ -37,6 +39,7 @@
 #include "viewer_client/desktop/main_window.hpp"
 #include "viewer_client/desktop/sound_dialog.hpp"
 #include "viewer_client/desktop/start_page.hpp"
+#include "viewer_client/desktop/tour.hpp"
 
 namespace osteon {
 namespace {
@@ -363,6 +366,98 @@ TEST_F(WindowTest, VolumeAndOffAreThereAtTheNextStart) {
   trigger("sound");
   EXPECT_TRUE(dialog->findChild<QCheckBox*>("sound_on")->isChecked()) << "the dialog shows the same";
   volume->setValue(100);  // for the next window
+}
+
+TEST_F(WindowTest, TheConnectionPanelSaysWhatRunsAndWhatWasStartedAgain) {
+  trigger("connections");
+  EXPECT_EQ(label("link_advice"), "Open a bone or join a room.");
+  open();
+  EXPECT_TRUE(until([&] { return label("link_server").startsWith("runs, answers in "); }))
+      << label("link_server").toStdString();
+  EXPECT_EQ(label("link_role"), "You practise alone.");
+  EXPECT_EQ(label("link_room"), label("connection").section(' ', -1)) << "the address of the status bar";
+  EXPECT_TRUE(until([&] { return label("link_haptic").startsWith("runs, heard "); }));
+  // The device is where the tool is.
+  click_tool("drill");
+  hover(middle());
+  EXPECT_TRUE(until([&] { return label("link_device").startsWith("mouse, at "); }));
+  if (!has_sound()) {
+    EXPECT_TRUE(until([&] {
+      return label("link_audio") == "runs, no device" && label("link_advice").startsWith("No sound device: ");
+    })) << label("link_audio").toStdString();
+  }
+
+  const auto clients = children("osteon-haptic");
+  ASSERT_EQ(clients.size(), 1u);
+  ASSERT_EQ(::kill(clients[0], SIGKILL), 0);
+  EXPECT_TRUE(until([&] { return label("link_device") == "mouse, not connected yet"; }));
+  EXPECT_TRUE(until([&] {
+    return label("link_haptic").startsWith("runs") && label("link_haptic").endsWith("started again: 1");
+  })) << label("link_haptic").toStdString();
+  trigger("connections");
+  EXPECT_FALSE(window_->findChild<QDockWidget*>("connection_panel")->isVisible());
+}
+
+TEST_F(WindowTest, TheTourFollowsWhatIsDone) {
+  QSettings().remove("tour/seen");
+  window_ = std::make_unique<MainWindow>();
+  show();
+  view_ = window_->findChild<BoneView*>("bone");
+  auto* tour = window_->findChild<Tour*>("tour");
+  ASSERT_NE(tour, nullptr);
+  ASSERT_TRUE(until([&] { return tour->isVisible(); }));
+  const auto at = [&](int step) { return tour->accessibleName() == QString("Step %1 of 5").arg(step); };
+  const auto ring_is_about = [&](const char* name) {
+    const auto* part = window_->findChild<QWidget*>(name);
+    const QRect ring = window_->findChild<QWidget*>("tour_ring")->geometry();
+    return ring.contains(QRect(part->mapTo(window_.get(), QPoint(0, 0)), part->size())) &&
+           ring.width() < part->width() + 20;
+  };
+  EXPECT_TRUE(at(1));
+  EXPECT_TRUE(ring_is_about("examples"));
+  EXPECT_FALSE(tour->isAncestorOf(QApplication::focusWidget())) << "it takes no focus by itself";
+  open();
+  EXPECT_TRUE(at(2));
+  EXPECT_TRUE(until([&] { return ring_is_about("tools"); }));
+  drill();
+  release(middle());
+  EXPECT_TRUE(at(4));
+  EXPECT_TRUE(until([&] { return ring_is_about("push_set"); }));
+  QWheelEvent wheel(QPointF(middle()), view_->mapToGlobal(middle()), {}, {0, 120}, Qt::NoButton, {}, Qt::NoScrollPhase,
+                    false);
+  QApplication::sendEvent(view_, &wheel);
+  EXPECT_TRUE(at(5));
+  EXPECT_TRUE(until([&] { return ring_is_about("undo_button"); }));
+  trigger("undo");
+  EXPECT_FALSE(tour->isVisible());
+  // It comes once.
+  window_ = std::make_unique<MainWindow>();
+  show();
+  QTest::qWait(100);
+  EXPECT_FALSE(window_->findChild<Tour*>("tour")->isVisible());
+}
+
+TEST_F(WindowTest, TheTourIsLedAndEndedByTheKeyboard) {
+  auto* tour = window_->findChild<Tour*>("tour");
+  trigger("tour_again");
+  ASSERT_TRUE(tour->isVisible());
+  QWidget* next = QApplication::focusWidget();
+  ASSERT_EQ(next, window_->findChild<QWidget*>("tour_next"));
+  QTest::keyClick(next, Qt::Key_Space);
+  EXPECT_EQ(tour->accessibleName(), "Step 2 of 5");
+  QTest::keyClick(next, Qt::Key_Escape);
+  EXPECT_FALSE(tour->isVisible());
+  EXPECT_NE(QApplication::focusWidget(), next);
+  // All of it by one key.
+  trigger("tour_again");
+  for (int step = 0; step < 5; ++step) QTest::keyClick(QApplication::focusWidget(), Qt::Key_Space);
+  EXPECT_FALSE(tour->isVisible());
+  // Escape ends it also from elsewhere, and nobody needs to look for the card.
+  trigger("tour_again");
+  auto* examples = window_->findChild<QListWidget*>("examples");
+  examples->setFocus();
+  QTest::keyClick(examples, Qt::Key_Escape);
+  EXPECT_FALSE(tour->isVisible());
 }
 
 TEST_F(WindowTest, AKilledHapticClientComesBackAndCutsAgain) {

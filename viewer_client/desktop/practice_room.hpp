@@ -10,6 +10,7 @@
 #include <memory>
 
 #include "viewer_client/desktop/child_process.hpp"
+#include "viewer_client/desktop/connection_panel.hpp"
 
 namespace osteon {
 
@@ -38,10 +39,21 @@ class PracticeRoom : public QObject {
   ~PracticeRoom() override;  // ends the clients first, then the server
 
   void start();
+  [[nodiscard]] ProgramState server_state() const { return state_of(server_.get(), server_past_); }
+  [[nodiscard]] ProgramState haptic_state() const { return state_of(haptic_.get(), haptic_past_); }
+  [[nodiscard]] ProgramState audio_state() const { return state_of(audio_.get(), audio_past_); }
   // Starts the audio client when the sound is wanted for the first time. Its socket switches it off and on again.
   void want_sound();
 
  private:
+  // What became of a program before.
+  struct Past {
+    int restarts = 0;
+    QString why;  // it ended last
+    bool given_up = false;
+  };
+
+  [[nodiscard]] static ProgramState state_of(const ChildProcess* child, const Past& past);
   void start_server();
   void look_for_address();
   void start_haptic();
@@ -60,6 +72,7 @@ class PracticeRoom : public QObject {
   // of children that died soon after their start, one after the other
   int server_deaths_ = 0, haptic_deaths_ = 0, audio_deaths_ = 0;
   bool over_ = false;
+  Past server_past_, haptic_past_, audio_past_;
   std::unique_ptr<ChildProcess> server_, haptic_, audio_;
 };
 
