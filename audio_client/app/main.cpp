@@ -2,20 +2,25 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
+#include <memory>
 #include <optional>
 #include <string>
 #include <thread>
+#include <utility>
 
 #include "audio_client/net/state_subscription.hpp"
 #include "audio_client/output/audio_output.hpp"
+#include "audio_client/output/kept_output.hpp"
 #include "audio_client/output/sound_engine.hpp"
 #include "audio_client/output/wav_recorder.hpp"
 #include "audio_client/synth/sound_scene.hpp"
 #include "common/core/mutex.hpp"
+#include "common/input/sound_link.hpp"
 #include "common/runtime/command_line.hpp"
 #include "common/runtime/files.hpp"
 #include "common/runtime/log.hpp"
@@ -30,6 +35,7 @@ using Clock = std::chrono::steady_clock;
 
 constexpr const char* kProgram = "osteon-audio";
 constexpr auto kPoll = 20ms;
+constexpr auto kReport = 50ms;  // to a window, from one to the next
 // Tools whose state was not received for so long run down. A working server sends their states at 120 Hz.
 constexpr auto kStale = 2s;
 // Running down takes at most half a second. An output that does not continue must not block the program.
@@ -39,7 +45,7 @@ struct Options {
   std::string server, room, name = "audio";
   wire::CredentialArguments credentials;
   std::string output = "pulse";
-  std::filesystem::path wav_file, state_log_file, summary_file;
+  std::filesystem::path wav_file, state_log_file, summary_file, window;
   double patience_s = 5;
 };
 
@@ -61,7 +67,7 @@ class StateLog {
     return {};
   }
 
-  void drain(audio::SoundEngine& engine, const audio::AudioOutput& output) {
+  void drain(audio::SoundEngine& engine, const audio::KeptOutput& output) {
     audio::Sounded sounded;
     while (engine.next_sounded(sounded)) {
       const auto delay = engine.latency() + output.latency();
@@ -86,7 +92,7 @@ class StateLog {
   DurationHistogram latency_;
 };
 
-nlohmann::json summary_of(const Options& options, const audio::SoundEngine& engine, const audio::AudioOutput& output,
+nlohmann::json summary_of(const Options& options, const audio::SoundEngine& engine, const audio::KeptOutput& output,
                           const StateLog& states, const std::optional<audio::WavRecorder>& recorder) {
   const double peak = engine.peak();
   nlohmann::json summary = {
@@ -118,6 +124,54 @@ nlohmann::json summary_of(const Options& options, const audio::SoundEngine& engi
   return summary;
 }
 
+// The window that started this program. It says how loud the sound is, and shows what is played.
+class Window {
+ public:
+  [[nodiscard]] static Result<Window> connect(const Options& options) {
+    if (options.window.empty()) return Window({}, {});
+    auto link = SoundClient::connect(options.window);
+    if (!link) return failure(link.error().code, "--window: " + link.error().message);
+    return Window(std::move(*link), options.output == "pulse" ? "PulseAudio" : options.output);
+  }
+
+  [[nodiscard]] bool there() const { return link_ != nullptr; }
+
+  void attend(audio::SoundEngine& engine, const audio::KeptOutput& output, unsigned rate_hz) {
+    if (!link_) return;
+    if (const std::optional<SoundWish> wish = link_->wait(0)) engine.set_volume(wish->on ? wish->volume : 0.0);
+    if (output.trouble() != said_ && !output.trouble().empty()) log::warn("no sound", {{"why", output.trouble()}});
+    said_ = output.trouble();
+    if (Clock::now() - reported_ < kReport) return;
+    reported_ = Clock::now();
+    link_->send(report(engine, output, rate_hz));
+  }
+
+ private:
+  Window(std::unique_ptr<SoundClient> link, std::string device) : link_(std::move(link)), device_(std::move(device)) {}
+
+  [[nodiscard]] SoundReport report(audio::SoundEngine& engine, const audio::KeptOutput& output,
+                                   unsigned rate_hz) const {
+    using Milliseconds = std::chrono::duration<double, std::milli>;
+    SoundReport report;
+    report.rate_hz = rate_hz;
+    report.trouble = output.trouble();
+    report.gaps = static_cast<double>(output.gaps());
+    if (!report.trouble.empty()) return report;
+    report.device = device_;
+    for (const float x : engine.wave())
+      report.wave.push_back(static_cast<int>(std::lround(std::clamp(x, -1.0F, 1.0F) * kFullScale)));
+    report.level = std::min(1.0F, engine.take_level());
+    report.work_ms = Milliseconds(engine.take_longest_work()).count();
+    report.buffer_ms = 1e3 * static_cast<double>(engine.buffer_frames()) / rate_hz;
+    report.latency_ms = Milliseconds(engine.latency() + output.latency()).count();
+    return report;
+  }
+
+  std::unique_ptr<SoundClient> link_;
+  std::string device_, said_;
+  Clock::time_point reported_;
+};
+
 Result<void> run(const Options& options, const StopSignal& stop) {
   const Result<wire::ClientCredentials> credentials = wire::client_credentials(options.credentials);
   if (!credentials) return tl::unexpected(credentials.error());
@@ -134,8 +188,12 @@ Result<void> run(const Options& options, const StopSignal& stop) {
   audio::SynthParams synth_params;
   synth_params.rate_hz = output_params.rate_hz;
   audio::SoundEngine engine(synth_params);
-  Result<std::unique_ptr<audio::AudioOutput>> output = audio::open_output(output_params, engine);
-  if (!output) return tl::unexpected(output.error());
+  Result<Window> window = Window::connect(options);
+  if (!window) return tl::unexpected(window.error());
+  if (window->there()) engine.set_volume(0.0);  // until the window has said how loud
+  audio::KeptOutput output([&] { return audio::open_output(output_params, engine); });
+  // With a window, a device that is missing is reported there, and looked for again.
+  if (Result<void> opened = output.open(); !opened && !window->there()) return opened;
 
   Result<wire::JoinedRoom> room = wire::join_room(
       options.server, wire::ClientKind::audio, options.name,
@@ -154,7 +212,8 @@ Result<void> run(const Options& options, const StopSignal& stop) {
     recorder = std::move(*opened);
     engine.record_to(*recorder);
   }
-  if (Result<void> started = (*output)->start(); !started) return started;
+  if (output.opened())
+    if (Result<void> started = output.start(); !started && !window->there()) return started;
   log::info("joined", {{"server", options.server}, {"case", room->case_title}, {"output", options.output}});
 
   // The reader and this thread deliver one at a time. Guards the engine's input and `received_at`; clang checks no
@@ -172,13 +231,15 @@ Result<void> run(const Options& options, const StopSignal& stop) {
 
   std::optional<Error> broken;
   while (!broken && !stop.wait_for(kPoll)) {
-    states.drain(engine, **output);
+    states.drain(engine, output);
+    window->attend(engine, output, output_params.rate_hz);
     if (const MutexLock lock(delivering); received_at && Clock::now() - *received_at > kStale) {
       engine.deliver(audio::SoundScene{});
       received_at.reset();
     }
     broken = watch->ended();
-    if (const std::string why = (*output)->failure_reason(); !why.empty()) broken = Error{ErrorCode::unavailable, why};
+    output.keep(Clock::now(), window->there());
+    if (!window->there() && !output.trouble().empty()) broken = Error{ErrorCode::unavailable, output.trouble()};
   }
 
   // The tools run down as if their motors had been switched off, so there is no click at the end. The reader has ended
@@ -187,10 +248,12 @@ Result<void> run(const Options& options, const StopSignal& stop) {
   engine.deliver(audio::SoundScene{});
   const auto end = Clock::now() + kRunDown;
   std::this_thread::sleep_for(2 * kPoll);
-  while (!engine.silent() && (*output)->failure_reason().empty() && Clock::now() < end)
+  while (!engine.silent() && output.trouble().empty() && Clock::now() < end) {
     std::this_thread::sleep_for(kPoll);
-  (*output)->stop();
-  states.drain(engine, **output);
+    output.keep(Clock::now(), false);
+  }
+  output.stop();
+  states.drain(engine, output);
 
   // All files are finished before the first error is reported.
   Result<void> outcome = broken ? Result<void>(tl::unexpected(*broken)) : Result<void>();
@@ -199,11 +262,11 @@ Result<void> run(const Options& options, const StopSignal& stop) {
   };
   keep_first(states.close(options.state_log_file));
   if (recorder) keep_first(recorder->close());
-  const nlohmann::json summary = summary_of(options, engine, **output, states, recorder);
+  const nlohmann::json summary = summary_of(options, engine, output, states, recorder);
   if (!options.summary_file.empty()) keep_first(write_file(options.summary_file, summary.dump(2) + "\n"));
   log::info("stopped", {{"seconds", static_cast<double>(engine.frames()) / output_params.rate_hz},
                         {"states", states.latency().count()},
-                        {"gaps", (*output)->gaps()},
+                        {"gaps", output.gaps()},
                         {"callback_p99_us", engine.work().percentile_us(99)},
                         {"received_to_sounded_p50_ms", states.latency().percentile_us(50) / 1000}});
   return outcome;
@@ -224,6 +287,9 @@ int main(int argc, char** argv) {
   app.add_option("--state-log", options.state_log_file,
                  "CSV: when each cutting state was received and when it was played");
   app.add_option("--summary", options.summary_file, "JSON written at the end: frames, latencies, callback work, peak");
+  app.add_option("--window", options.window,
+                 "Socket of the window osteon, which starts this program by itself: the window sets the volume and "
+                 "shows the sound. A missing sound server is then waited for");
   app.add_option("--timeout", options.patience_s, "Seconds to wait for the server")
       ->check(CLI::Range(0.0, 3600.0))
       ->capture_default_str();

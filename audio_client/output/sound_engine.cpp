@@ -12,7 +12,9 @@ std::int64_t now_ns() noexcept { return std::chrono::steady_clock::now().time_si
 
 }  // namespace
 
-SoundEngine::SoundEngine(const SynthParams& params) : rate_hz_(params.rate_hz) { synth_.prepare(params); }
+SoundEngine::SoundEngine(const SynthParams& params) : rate_hz_(params.rate_hz), ramp_(params.rate_hz) {
+  synth_.prepare(params);
+}
 
 void SoundEngine::render(std::span<float> mono) noexcept {
   const std::int64_t start_ns = now_ns();
@@ -26,7 +28,23 @@ void SoundEngine::render(std::span<float> mono) noexcept {
   peak_.store(peak, std::memory_order_relaxed);
   frames_.fetch_add(mono.size(), std::memory_order_relaxed);
   silent_.store(synth_.silent(), std::memory_order_relaxed);
-  work_.record(std::chrono::nanoseconds(now_ns() - start_ns));
+  ramp_.apply(mono, volume_.load(std::memory_order_relaxed));
+  note_played(mono);
+  const std::int64_t took_ns = now_ns() - start_ns;
+  work_.record(std::chrono::nanoseconds(took_ns));
+  longest_ns_.store(std::max(longest_ns_.load(std::memory_order_relaxed), took_ns), std::memory_order_relaxed);
+}
+
+// A reader that takes a maximum in the middle of this may get it a second time, and loses none.
+void SoundEngine::note_played(std::span<const float> mono) noexcept {
+  const std::span<const float> newest = mono.last(std::min(mono.size(), played_.size()));
+  std::copy(played_.begin() + static_cast<std::ptrdiff_t>(newest.size()), played_.end(), played_.begin());
+  std::copy(newest.begin(), newest.end(), played_.end() - static_cast<std::ptrdiff_t>(newest.size()));
+  waves_.store(played_);
+  float level = level_.load(std::memory_order_relaxed);
+  for (const float x : mono) level = std::max(level, std::abs(x));
+  level_.store(level, std::memory_order_relaxed);
+  buffer_frames_.store(mono.size(), std::memory_order_relaxed);
 }
 
 void SoundEngine::take_scene(std::int64_t start_ns) noexcept {

@@ -1,10 +1,14 @@
 // Runs on the sound card's thread: takes the newest scene, renders and records it, and notes when it was first used.
 #pragma once
+#include <array>
 #include <atomic>
+#include <chrono>
+#include <cstddef>
 #include <cstdint>
 #include <span>
 
 #include "audio_client/output/audio_output.hpp"
+#include "audio_client/output/volume_ramp.hpp"
 #include "audio_client/output/wav_recorder.hpp"
 #include "audio_client/synth/drill_synth.hpp"
 #include "common/runtime/spsc_queue.hpp"
@@ -23,13 +27,31 @@ struct Sounded {
 
 class SoundEngine final : public SoundSource {
  public:
+  static constexpr std::size_t kWave_frames = 512;
+  using Wave = std::array<float, kWave_frames>;
+
   explicit SoundEngine(const SynthParams& params);
-  // Records from now on; call it before the output starts. The recorder must outlive the engine's last render().
+  // Records from now on, at full volume; call it before the output starts. The recorder must outlive the engine's last
+  // render().
   void record_to(WavRecorder& recorder) noexcept { recorder_ = &recorder; }
 
   void deliver(const SoundScene& scene) noexcept { scenes_.store(scene); }            // one thread only
   void render(std::span<float> mono) noexcept override;                               // [audio]
   bool next_sounded(Sounded& sounded) noexcept { return sounded_.try_pop(sounded); }  // one thread only
+  // The listener's volume from now on, a factor of the amplitude, 0 to 1. The sound follows without a click.
+  void set_volume(double factor) noexcept { volume_.store(factor, std::memory_order_relaxed); }
+
+  // What was played last, oldest first, as the listener hears it. One thread only.
+  [[nodiscard]] const Wave& wave() noexcept {
+    waves_.refresh();
+    return waves_.value();
+  }
+  // The largest amplitude that the listener heard, and the longest work of one render(), since the last call.
+  [[nodiscard]] float take_level() noexcept { return level_.exchange(0, std::memory_order_relaxed); }
+  [[nodiscard]] std::chrono::nanoseconds take_longest_work() noexcept {
+    return std::chrono::nanoseconds(longest_ns_.exchange(0, std::memory_order_relaxed));
+  }
+  [[nodiscard]] std::size_t buffer_frames() const noexcept { return buffer_frames_.load(std::memory_order_relaxed); }
 
   // Time from the start of render() to the frame that first carries the new scene, without the output's own latency.
   [[nodiscard]] std::chrono::nanoseconds latency() const noexcept;
@@ -43,6 +65,7 @@ class SoundEngine final : public SoundSource {
 
  private:
   void take_scene(std::int64_t now_ns) noexcept;
+  void note_played(std::span<const float> mono) noexcept;
 
   double rate_hz_;
   DrillSynth synth_;
@@ -55,6 +78,13 @@ class SoundEngine final : public SoundSource {
   std::atomic<float> peak_{0};
   std::atomic<bool> silent_{true};
   DurationHistogram work_;
+  VolumeRamp ramp_;
+  std::atomic<double> volume_{1};
+  Wave played_{};  // [audio] in the order of time
+  TripleBuffer<Wave> waves_;
+  std::atomic<float> level_{0};
+  std::atomic<std::int64_t> longest_ns_{0};
+  std::atomic<std::size_t> buffer_frames_{0};
 };
 
 }  // namespace osteon::audio

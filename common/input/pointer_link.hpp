@@ -1,15 +1,12 @@
 // A local socket between a window and the haptic client of the same user: where the pointer is, and what the tool does.
 // Each message is one packet of JSON text. The newest message counts, so neither side ever waits.
 #pragma once
-#include <cstdint>
-#include <filesystem>
-#include <memory>
-#include <optional>
 #include <string>
 #include <string_view>
 
 #include "common/core/result.hpp"
 #include "common/geometry/pose.hpp"
+#include "common/input/local_link.hpp"
 
 namespace osteon {
 
@@ -48,44 +45,10 @@ struct PointerOutput {
 [[nodiscard]] Result<PointerInput> read_pointer_input(std::string_view text);
 [[nodiscard]] Result<PointerOutput> read_pointer_output(std::string_view text);
 
-// The window's end. For one thread; no call waits.
-class PointerServer {
- public:
-  // Makes the socket, which only this user may open. A socket that a dead program left is replaced. Errors: exists (a
-  // program listens there), invalid_input (the path is too long), internal.
-  [[nodiscard]] static Result<std::unique_ptr<PointerServer>> listen(const std::filesystem::path& socket);
-  ~PointerServer();  // removes the socket
+[[nodiscard]] LocalLinkNames pointer_link_names();
 
-  void send(const PointerInput& input);
-  // What the haptic client said last. None: it has said nothing yet.
-  [[nodiscard]] const std::optional<PointerOutput>& newest();
-  [[nodiscard]] bool connected();
-  [[nodiscard]] std::uint64_t refused() const;  // messages that could not be read
-
- private:
-  struct Impl;
-  explicit PointerServer(std::unique_ptr<Impl> impl);
-  std::unique_ptr<Impl> impl_;
-};
-
-// The haptic client's end. For one thread.
-class PointerClient {
- public:
-  // Errors: not_found (nobody listens there), denied (a program of another user does), unavailable (other clients wait
-  // there), invalid_input (the path is too long).
-  [[nodiscard]] static Result<std::unique_ptr<PointerClient>> connect(const std::filesystem::path& socket);
-  ~PointerClient();
-
-  // The newest message that came within this time. None: none came.
-  [[nodiscard]] std::optional<PointerInput> wait(int milliseconds);
-  void send(const PointerOutput& output);
-  [[nodiscard]] bool closed() const;            // the window has gone
-  [[nodiscard]] std::uint64_t refused() const;  // messages that could not be read
-
- private:
-  struct Impl;
-  explicit PointerClient(std::unique_ptr<Impl> impl);
-  std::unique_ptr<Impl> impl_;
-};
+// The window's end, and the haptic client's.
+using PointerServer = LinkServer<PointerInput, PointerOutput, read_pointer_output, pointer_link_names>;
+using PointerClient = LinkClient<PointerOutput, PointerInput, read_pointer_input, pointer_link_names>;
 
 }  // namespace osteon

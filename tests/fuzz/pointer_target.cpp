@@ -4,6 +4,7 @@
 
 #include "common/core/check.hpp"
 #include "common/input/pointer_link.hpp"
+#include "common/input/sound_link.hpp"
 #include "tests/fuzz/import_files.hpp"
 
 namespace osteon::fuzz {
@@ -37,6 +38,30 @@ void check_output(const PointerOutput& output) {
   OSTEON_CHECK(again->pushing == output.pushing && again->on_metal == output.on_metal);
 }
 
+void check_report(const SoundReport& report) {
+  OSTEON_CHECK(report.wave.size() <= kMostWaveSamples && report.rate_hz >= 1.0 && within(report.level, 0.0, 1.0));
+  for (const int sample : report.wave) OSTEON_CHECK(within(sample, -kFullScale, kFullScale));
+  for (const double ms : {report.work_ms, report.buffer_ms, report.latency_ms}) OSTEON_CHECK(within(ms, 0.0, 1e6));
+  OSTEON_CHECK(report.device.size() <= 512 && report.trouble.size() <= 512);
+  const Result<SoundReport> again = read_sound_report(encode(report));
+  OSTEON_CHECK(again && *again == report);
+}
+
+void read_sound_message(std::span<const std::uint8_t> data) {
+  const std::string_view text(reinterpret_cast<const char*>(data.data()), data.size());
+  if (const Result<SoundWish> wish = read_sound_wish(text)) {
+    OSTEON_CHECK(within(wish->volume, 0.0, 1.0));
+    const Result<SoundWish> again = read_sound_wish(encode(*wish));
+    OSTEON_CHECK(again && *again == *wish);
+  } else {
+    expect_bounded(wish.error());
+  }
+  if (const Result<SoundReport> report = read_sound_report(text))
+    check_report(*report);
+  else
+    expect_bounded(report.error());
+}
+
 void read_message(std::span<const std::uint8_t> data) {
   const std::string_view text(reinterpret_cast<const char*>(data.data()), data.size());
   if (const Result<PointerInput> input = read_pointer_input(text))
@@ -66,6 +91,22 @@ Target pointer_message_target() {
                 {bytes_of_text(encode(PointerInput{})), bytes_of_text(encode(input)),
                  bytes_of_text(encode(PointerOutput{})), bytes_of_text(encode(output))}};
   // Half of the changed inputs keep the form of JSON, so that fields are reached.
+  target.change = change_number;
+  return target;
+}
+
+Target sound_message_target() {
+  SoundReport report;
+  for (int i = 0; i < 64; ++i) report.wave.push_back((i % 2 == 0 ? 1 : -1) * i * kFullScale / 63);
+  report.level = 0.5;
+  report.work_ms = 0.125;
+  report.buffer_ms = 5.333;
+  report.device = "PulseAudio";
+  report.trouble = "no sound server answers (\u00fc)";
+  Target target{
+      "sound_message",
+      read_sound_message,
+      {bytes_of_text(encode(SoundWish{})), bytes_of_text(encode(SoundReport{})), bytes_of_text(encode(report))}};
   target.change = change_number;
   return target;
 }

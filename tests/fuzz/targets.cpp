@@ -256,7 +256,8 @@ std::vector<Target> targets() {
       label_names_target(),
       label_header_target(),
       dicom_segments_target(),
-      pointer_message_target()};
+      pointer_message_target(),
+      sound_message_target()};
 }
 
 }  // namespace osteon::fuzz

@@ -298,6 +298,33 @@ TEST_F(LanguageTest, TheSurgeryViewIsWholeInBothLanguages) {
   EXPECT_THAT(untranslated(seen["en"], seen["de"]), IsEmpty());
 }
 
+TEST_F(LanguageTest, TourSoundAndConnectionsAreWholeInBothLanguages) {
+  std::map<std::string, std::set<QString>> seen;
+  for (const char* language : {"en", "de"}) {
+    open_window(language);
+    window_->findChild<QAction*>("tour_again")->trigger();
+    for (int step = 0; step < 5; ++step) {
+      QTest::qWait(250);  // the card finds its place
+      expect_whole(std::string(language) + ", step " + std::to_string(step + 1));
+      seen[language].merge(texts(*window_));
+      QTest::keyClick(window_->findChild<QPushButton*>("tour_next"), Qt::Key_Space);
+    }
+    open_bone();
+    if (HasFatalFailure()) return;
+    window_->findChild<QAction*>("connections")->trigger();
+    window_->findChild<QAction*>("sound_settings")->trigger();
+    const auto* dialog = window_->findChild<QWidget*>("sound_dialog");
+    ASSERT_NE(dialog, nullptr);
+    QTest::qWait(700);
+    expect_whole(language);
+    EXPECT_THAT(clipped(*dialog), IsEmpty()) << language;
+    EXPECT_THAT(nameless(*dialog), IsEmpty()) << language;
+    seen[language].merge(texts(*window_));
+    window_->findChild<QAction*>("connections")->trigger();
+  }
+  EXPECT_THAT(untranslated(seen["en"], seen["de"]), IsEmpty());
+}
+
 TEST_F(LanguageTest, ShortCutsAreTheSameInBothLanguages) {
   std::map<std::string, std::map<QString, QKeySequence>> keys;
   for (const char* language : {"en", "de"}) {

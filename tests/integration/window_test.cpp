@@ -8,12 +8,14 @@
 #include <QCheckBox>
 #include <QComboBox>
 #include <QCursor>
+#include <QDockWidget>
 #include <QDropEvent>
 #include <QLabel>
 #include <QListWidget>
 #include <QMenu>
 #include <QMimeData>
 #include <QPushButton>
+#include <QSettings>
 #include <QSlider>
 #include <QSpinBox>
 #include <QStackedWidget>
@@ -25,6 +27,7 @@
 #include <QWindow>
 #include <algorithm>
 #include <chrono>
+#include <cstdlib>
 #include <fstream>
 #include <memory>
 #include <sstream>
@@ -34,7 +37,9 @@
 #include "tests/integration/desk.hpp"
 #include "viewer_client/desktop/bone_view.hpp"
 #include "viewer_client/desktop/main_window.hpp"
+#include "viewer_client/desktop/sound_dialog.hpp"
 #include "viewer_client/desktop/start_page.hpp"
+#include "viewer_client/desktop/tour.hpp"
 
 namespace osteon {
 namespace {
@@ -61,7 +66,12 @@ std::vector<pid_t> children(const std::string& program) {
 
 class WindowTest : public testing::Test {
  protected:
-  static void SetUpTestSuite() { desk_ = std::make_unique<Desk>(); }
+  static void SetUpTestSuite() {
+    desk_ = std::make_unique<Desk>();
+    // Only deploy/with-null-sink brings a sound server. Nobody listens in this folder.
+    if (!has_sound()) ::setenv("PULSE_SERVER", ("unix:" + (desk_->temp() / "nobody").string()).c_str(), 1);
+  }
+  static bool has_sound() { return std::getenv("OSTEON_TEST_SOUND") != nullptr; }
   static void TearDownTestSuite() { desk_.reset(); }
 
   void SetUp() override {
@@ -293,6 +303,161 @@ TEST_F(WindowTest, APointerIsInEitherPictureSideBySide) {
   trigger("stereo_quad_buffer");
   EXPECT_TRUE(window_->statusBar()->currentMessage().contains("quad buffer"));
   EXPECT_TRUE(window_->findChild<QAction*>("stereo_off")->isChecked());
+}
+
+// The drill is heard while it turns, as loud as the slider says. Without a sound server the dialog says so. Both are
+// run: integration.window has none, and integration.window_sound has one.
+TEST_F(WindowTest, TheSoundDialogSetsTheVolumeAndShowsWhatIsPlayed) {
+  open();
+  trigger("sound_settings");
+  auto* dialog = window_->findChild<SoundDialog*>("sound_dialog");
+  ASSERT_NE(dialog, nullptr);
+  EXPECT_TRUE(dialog->isVisible());
+  const auto* plot = dialog->findChild<WavePlot*>("wave");
+  const auto* trouble = dialog->findChild<QLabel*>("sound_trouble");
+  auto* volume = dialog->findChild<QSlider*>("volume");
+  auto* on = dialog->findChild<QCheckBox*>("sound_on");
+  const auto loudest = [&] {
+    int most = 0;
+    for (const int sample : plot->wave()) most = std::max(most, std::abs(sample));
+    return most;
+  };
+  click_tool("drill");
+  hover(middle());
+  if (has_sound()) {
+    ASSERT_TRUE(until([&] { return loudest() > 100; })) << trouble->text().toStdString() << problem();
+    EXPECT_EQ(trouble->text(), QString());
+    EXPECT_EQ(label("sound_device"), "PulseAudio");
+    EXPECT_TRUE(label("sound_work").endsWith(" ms")) << label("sound_work").toStdString();
+    QTest::keyClick(volume, Qt::Key_Home);
+    EXPECT_TRUE(until([&] { return loudest() == 0 && !plot->wave().empty(); }));
+    QTest::keyClick(volume, Qt::Key_End);
+    EXPECT_TRUE(until([&] { return loudest() > 100; }));
+    QTest::keyClick(on, Qt::Key_Space);
+    EXPECT_TRUE(until([&] { return loudest() == 0 && !plot->wave().empty(); }));
+    QTest::keyClick(on, Qt::Key_Space);
+    EXPECT_TRUE(until([&] { return loudest() > 100; }));
+  } else {
+    ASSERT_TRUE(until([&] { return trouble->text().startsWith("No sound device: "); })) << problem();
+    EXPECT_EQ(loudest(), 0);
+    EXPECT_TRUE(children("osteon-audio").size() == 1) << "it waits for a device";
+  }
+  // Escape closes the dialog, and the tool stays in the hand.
+  QTest::keyClick(dialog, Qt::Key_Escape);
+  EXPECT_FALSE(dialog->isVisible());
+  EXPECT_TRUE(view_->holding());
+}
+
+TEST_F(WindowTest, VolumeAndOffAreThereAtTheNextStart) {
+  const auto open_dialog = [&] {
+    trigger("sound_settings");
+    return window_->findChild<SoundDialog*>("sound_dialog");
+  };
+  const auto* dialog = open_dialog();
+  dialog->findChild<QSlider*>("volume")->setValue(40);
+  QTest::keyClick(dialog->findChild<QCheckBox*>("sound_on"), Qt::Key_Space);
+  EXPECT_FALSE(window_->findChild<QAction*>("sound")->isChecked()) << "the menu shows the same";
+  window_ = std::make_unique<MainWindow>();
+  show();
+  EXPECT_FALSE(window_->findChild<QAction*>("sound")->isChecked());
+  dialog = open_dialog();
+  auto* volume = dialog->findChild<QSlider*>("volume");
+  EXPECT_EQ(volume->value(), 40);
+  trigger("sound");
+  EXPECT_TRUE(dialog->findChild<QCheckBox*>("sound_on")->isChecked()) << "the dialog shows the same";
+  volume->setValue(100);  // for the next window
+}
+
+TEST_F(WindowTest, TheConnectionPanelSaysWhatRunsAndWhatWasStartedAgain) {
+  trigger("connections");
+  EXPECT_EQ(label("link_advice"), "Open a bone or join a room.");
+  open();
+  EXPECT_TRUE(until([&] { return label("link_server").startsWith("runs, answers in "); }))
+      << label("link_server").toStdString();
+  EXPECT_EQ(label("link_role"), "You practise alone.");
+  EXPECT_EQ(label("link_room"), label("connection").section(' ', -1)) << "the address of the status bar";
+  EXPECT_TRUE(until([&] { return label("link_haptic").startsWith("runs, heard "); }));
+  // The device is where the tool is.
+  click_tool("drill");
+  hover(middle());
+  EXPECT_TRUE(until([&] { return label("link_device").startsWith("mouse, at "); }));
+  if (!has_sound()) {
+    EXPECT_TRUE(until([&] {
+      return label("link_audio") == "runs, no device" && label("link_advice").startsWith("No sound device: ");
+    })) << label("link_audio").toStdString();
+  }
+
+  const auto clients = children("osteon-haptic");
+  ASSERT_EQ(clients.size(), 1u);
+  ASSERT_EQ(::kill(clients[0], SIGKILL), 0);
+  EXPECT_TRUE(until([&] { return label("link_device") == "mouse, not connected yet"; }));
+  EXPECT_TRUE(until([&] {
+    return label("link_haptic").startsWith("runs") && label("link_haptic").endsWith("started again: 1");
+  })) << label("link_haptic").toStdString();
+  trigger("connections");
+  EXPECT_FALSE(window_->findChild<QDockWidget*>("connection_panel")->isVisible());
+}
+
+TEST_F(WindowTest, TheTourFollowsWhatIsDone) {
+  QSettings().remove("tour/seen");
+  window_ = std::make_unique<MainWindow>();
+  show();
+  view_ = window_->findChild<BoneView*>("bone");
+  auto* tour = window_->findChild<Tour*>("tour");
+  ASSERT_NE(tour, nullptr);
+  ASSERT_TRUE(until([&] { return tour->isVisible(); }));
+  const auto at = [&](int step) { return tour->accessibleName() == QString("Step %1 of 5").arg(step); };
+  const auto ring_is_about = [&](const char* name) {
+    const auto* part = window_->findChild<QWidget*>(name);
+    const QRect ring = window_->findChild<QWidget*>("tour_ring")->geometry();
+    return ring.contains(QRect(part->mapTo(window_.get(), QPoint(0, 0)), part->size())) &&
+           ring.width() < part->width() + 20;
+  };
+  EXPECT_TRUE(at(1));
+  EXPECT_TRUE(ring_is_about("examples"));
+  EXPECT_FALSE(tour->isAncestorOf(QApplication::focusWidget())) << "it takes no focus by itself";
+  open();
+  EXPECT_TRUE(at(2));
+  EXPECT_TRUE(until([&] { return ring_is_about("tools"); }));
+  drill();
+  release(middle());
+  EXPECT_TRUE(at(4));
+  EXPECT_TRUE(until([&] { return ring_is_about("push_set"); }));
+  QWheelEvent wheel(QPointF(middle()), view_->mapToGlobal(middle()), {}, {0, 120}, Qt::NoButton, {}, Qt::NoScrollPhase,
+                    false);
+  QApplication::sendEvent(view_, &wheel);
+  EXPECT_TRUE(at(5));
+  EXPECT_TRUE(until([&] { return ring_is_about("undo_button"); }));
+  trigger("undo");
+  EXPECT_FALSE(tour->isVisible());
+  // It comes once.
+  window_ = std::make_unique<MainWindow>();
+  show();
+  QTest::qWait(100);
+  EXPECT_FALSE(window_->findChild<Tour*>("tour")->isVisible());
+}
+
+TEST_F(WindowTest, TheTourIsLedAndEndedByTheKeyboard) {
+  auto* tour = window_->findChild<Tour*>("tour");
+  trigger("tour_again");
+  ASSERT_TRUE(tour->isVisible());
+  QWidget* next = QApplication::focusWidget();
+  ASSERT_EQ(next, window_->findChild<QWidget*>("tour_next"));
+  QTest::keyClick(next, Qt::Key_Space);
+  EXPECT_EQ(tour->accessibleName(), "Step 2 of 5");
+  QTest::keyClick(next, Qt::Key_Escape);
+  EXPECT_FALSE(tour->isVisible());
+  EXPECT_NE(QApplication::focusWidget(), next);
+  // All of it by one key.
+  trigger("tour_again");
+  for (int step = 0; step < 5; ++step) QTest::keyClick(QApplication::focusWidget(), Qt::Key_Space);
+  EXPECT_FALSE(tour->isVisible());
+  // Escape ends it also from elsewhere, and nobody needs to look for the card.
+  trigger("tour_again");
+  auto* examples = window_->findChild<QListWidget*>("examples");
+  examples->setFocus();
+  QTest::keyClick(examples, Qt::Key_Escape);
+  EXPECT_FALSE(tour->isVisible());
 }
 
 TEST_F(WindowTest, AKilledHapticClientComesBackAndCutsAgain) {

@@ -8,7 +8,7 @@ FORCE = "haptic_client/contact/cutting_force.cpp"
 LEDGER = "haptic_client/rendering/energy_ledger.cpp"
 PIXELS = "server/import/dicom_pixels.cpp"
 APPLY = "server/room/room_apply.cpp"
-LINK = "common/input/pointer_link.cpp"
+LINK, MESSAGE = "common/input/local_link.cpp", "common/input/link_message.cpp"
 POINTED = "haptic_client/simulation/pointer_session.cpp"
 
 MUTATIONS = [
@@ -285,10 +285,14 @@ MUTATIONS = [
       "PointedHand.AnotherTool*"),
     M(POINTED, "input.may_cut = phase_ >= PointerPhase::pushes;", "input.may_cut = true;",
       "a turning tool that rests cuts while it is moved", "unit.pointed_hand", "PointedHand.ATilted*"),
-    M(LINK, "if (!(value >= least && value <= most)) return wrong(name), least;", "",
+    M(MESSAGE, "if (!(value >= least && value <= most)) return wrong(name), least;", "",
       "a pointer's numbers have no range", "unit.input", "PointerMessage.*"),
-    M(LINK, "if (same_user(waiting.get())) peer = std::move(waiting);", "peer = std::move(waiting);",
+    M(LINK, "if (same_user(waiting.get())) peer_ = std::move(waiting);", "peer_ = std::move(waiting);",
       "a window talks to another user", "unit.input", "PointerLink.AnotherUser*"),
-    M(LINK, "std::array<char, kMostBytes + 1> buffer;", "std::array<char, kMostBytes> buffer;",
+    M(LINK, "std::array<char, kMostLinkBytes + 1> buffer;", "std::array<char, kMostLinkBytes> buffer;",
       "the beginning of a longer message counts as a message", "unit.input", "PointerLink.*"),
+    M(MESSAGE, "field->size() > most_count", "false",
+      "a sound's wave has any length", "unit.input", "SoundMessage.*"),
+    M("audio_client/output/volume_ramp.hpp", "std::clamp(wanted - factor_, -step_, step_)", "wanted - factor_",
+      "a change of the volume clicks", "unit.audio_client", "VolumeRamp.*"),
 ]

@@ -12,6 +12,7 @@
 #include <QFileDialog>
 #include <QFormLayout>
 #include <QInputDialog>
+#include <QKeyEvent>
 #include <QLabel>
 #include <QLineEdit>
 #include <QLocale>
@@ -25,18 +26,22 @@
 #include <QToolBar>
 #include <QUrl>
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "common/tools/tool.hpp"
 #include "viewer_client/desktop/bone_view.hpp"
 #include "viewer_client/desktop/clipping_panel.hpp"
+#include "viewer_client/desktop/connection_panel.hpp"
 #include "viewer_client/desktop/gauges_panel.hpp"
 #include "viewer_client/desktop/language.hpp"
 #include "viewer_client/desktop/menu_keys.hpp"
 #include "viewer_client/desktop/properties_panel.hpp"
+#include "viewer_client/desktop/sound_control.hpp"
 #include "viewer_client/desktop/start_page.hpp"
 #include "viewer_client/desktop/tool_bar.hpp"
 #include "viewer_client/desktop/tool_names.hpp"
+#include "viewer_client/desktop/tour.hpp"
 #include "viewer_client/desktop/view_options.hpp"
 
 namespace osteon {
@@ -82,7 +87,10 @@ MainWindow::MainWindow() {
   view_->setObjectName("bone");
   view_->setAccessibleName(tr("The bone"));
   view_->set_events({[this] { send_pointer(); },
-                     [this] { mark_before(tr("Before %1").arg(tool_title(view_->pointer().tool()))); },
+                     [this] {
+                       tour_->did(TourStep::push);
+                       mark_before(tr("Before %1").arg(tool_title(view_->pointer().tool())));
+                     },
                      [this](const SurfaceHit& hit) { place_item(hit); },
                      [this](const ViewFrustum& from) {
                        if (room_) room_->look(from);
@@ -93,6 +101,7 @@ MainWindow::MainWindow() {
   make_panels();
   make_actions();
   make_status();
+  tour_ = new Tour(this);
   enable_room_actions(false);
   clock_.start();
   connect(&gauge_timer_, &QTimer::timeout, this, [this] { refresh_gauges(); });
@@ -119,6 +128,7 @@ void MainWindow::make_panels() {
   gauges_ = new GaugesPanel;
   properties_ = new PropertiesPanel(
       [this](const PropertiesPanel::Chosen& chosen) {
+        if (chosen.push_n != view_->pointer().push_n()) tour_->did(TourStep::strength);
         view_->pointer().set_spindle_speed(chosen.spindle_rpm);
         view_->pointer().set_push(chosen.push_n);
         send_pointer();
@@ -127,6 +137,11 @@ void MainWindow::make_panels() {
   dock(tr("Tool"), "tool_panel", properties_, Qt::RightDockWidgetArea);
   dock(tr("Gauges"), "gauges_panel", gauges_, Qt::RightDockWidgetArea);
   dock(tr("Open the bone"), "clipping_panel", clipping_, Qt::RightDockWidgetArea)->hide();
+  QDockWidget* connections = dock(tr("Connections"), "connection_panel",
+                                  new ConnectionPanel([this] { return this->connections(); }), Qt::RightDockWidgetArea);
+  connections->hide();
+  connections->toggleViewAction()->setObjectName("connections");
+  connections->toggleViewAction()->setShortcut(QKeySequence("Ctrl+Shift+N"));
 }
 
 QAction* MainWindow::add_action(QMenu* menu, const QString& words, const char* name, const QKeySequence& keys,
@@ -215,7 +230,12 @@ void MainWindow::make_tools_menu() {
   tools_->fill(*tools);
   tools->addSeparator();
   add_action(
-      tools, tr("&Put the tool down"), "put_down", Qt::Key_Escape, [this] { put_tool_down(); }, true);
+      tools, tr("&Put the tool down"), "put_down", Qt::Key_Escape,
+      [this] {
+        if (!view_->holding() && !view_->placing()) tour_->end();
+        put_tool_down();
+      },
+      true);
   spindle_ = add_action(
       tools, tr("Run the &spindle"), "spindle", Qt::Key_R,
       [this] {
@@ -226,18 +246,26 @@ void MainWindow::make_tools_menu() {
   spindle_->setCheckable(true);
   sound_ = add_action(
       tools, tr("S&ound"), "sound", QKeySequence("Ctrl+Shift+S"),
-      [this] {
-        if (practice_) practice_->set_sound(sound_->isChecked());
-      },
-      true);
+      [this] { sound_control_->set_on(sound_->isChecked()); }, false);
+  sound_control_ = new SoundControl({[this](bool on) {
+                                       sound_->setChecked(on);
+                                       if (on && practice_) practice_->want_sound();
+                                     },
+                                     [this](const QString& sentence) { say(sentence); }},
+                                    this);
   sound_->setCheckable(true);
-  sound_->setChecked(true);
+  sound_->setChecked(sound_control_->on());
+  add_action(
+      tools, tr("&Volume and wave form…"), "sound_settings", QKeySequence("Ctrl+Shift+V"),
+      [this] { sound_control_->show_dialog(); }, false);
 }
 
 void MainWindow::make_help_menu() {
   QMenu* help = menuBar()->addMenu(tr("&Help"));
   add_action(
       help, tr("&How to hold a tool"), "help", QKeySequence::HelpContents, [this] { show_help(); }, false);
+  add_action(
+      help, tr("&Tour"), "tour_again", QKeySequence("Ctrl+F1"), [this] { tour_->begin(); }, false);
   add_action(
       help, tr("&About Osteon"), "about", {},
       [this] {
@@ -261,6 +289,7 @@ void MainWindow::make_actions() {
   for (const char* name :
        {"open_case", "save_picture", "undo", "redo", "mark", "overview", "look_tool", "spindle", "put_down"})
     upper->addAction(findChild<QAction*>(name));
+  upper->widgetForAction(findChild<QAction*>("undo"))->setObjectName("undo_button");
 }
 
 void MainWindow::make_status() {
@@ -276,7 +305,8 @@ void MainWindow::make_status() {
 void MainWindow::enable_room_actions(bool on) {
   for (QAction* action : room_actions_) action->setEnabled(on);
   tools_->setEnabled(on && !watching_);
-  for (QDockWidget* panel : findChildren<QDockWidget*>()) panel->setEnabled(on);
+  for (QDockWidget* panel : findChildren<QDockWidget*>())
+    panel->setEnabled(on || panel->objectName() == "connection_panel");  // it says why there is no room
   if (watching_)
     for (const char* name : kWorkActions) findChild<QAction*>(name)->setEnabled(false);
 }
@@ -451,6 +481,10 @@ void MainWindow::practise(const std::filesystem::path& bone, const std::filesyst
   auto pointer = PointerServer::listen(options.pointer);
   if (!pointer) return room_ended(QString::fromStdString(pointer.error().message));
   pointer_ = std::move(*pointer);
+  options.sound_socket =
+      (runtime + "/osteon-sound-" + QString::number(QCoreApplication::applicationPid())).toStdString();
+  if (const auto sound = sound_control_->listen(options.sound_socket); !sound)
+    return room_ended(QString::fromStdString(sound.error().message));
   const QString title = name.isEmpty() ? case_title(bone) : name;
   opened_ = RecentEntry{tr("%1, %2").arg(title, QLocale().toString(QDateTime::currentDateTime(), QLocale::ShortFormat)),
                         bone, options.folder};
@@ -476,6 +510,7 @@ void MainWindow::room_opened(const QString& address) {
 void MainWindow::join(const RoomAddress& room) {
   if (!practice_) leave_room();
   address_ = room.address;
+  room_name_ = room.room;
   RoomSubscriptionOptions options;
   options.address = room.address.toStdString();
   options.room = room.room.toStdString();
@@ -520,6 +555,8 @@ void MainWindow::show_joined(const WatchedRoom& room) {
   if (pointer_) pointer_timer_.start(kPointerPeriod_ms);
   if (opened_) remember(*opened_);
   view_->setFocus();
+  tour_->did(TourStep::open);
+  if (watching_) tour_->end();
   if (watching_) return say(tr("You watch. The view follows the tool; a drag turns the bone, T follows again."));
   say(tr("Choose a tool on the left, then hold the left button on the bone."));
   if (practice_ && !first_tool_.empty()) take_tool(std::exchange(first_tool_, {}));
@@ -534,9 +571,12 @@ void MainWindow::leave_room() {
   room_.reset();
   practice_.reset();
   pointer_.reset();
+  sound_control_->close();
   opened_.reset();
   set_watching(false);
   enable_room_actions(false);
+  address_.clear();
+  room_name_.clear();
   setWindowTitle("Osteon");
   for (QLabel* label : {device_, position_, connection_}) label->clear();
   start_->refresh();
@@ -569,6 +609,7 @@ void MainWindow::take_tool(const std::string& tool) {
     say(tr("Click on the bone to place it there."));
   }
   view_->setFocus();
+  tour_->did(TourStep::take);
   send_pointer();
 }
 
@@ -596,6 +637,7 @@ void MainWindow::send_pointer() {
   if (!pointer_) return;
   ToolPointer& pointer = view_->pointer();
   if (spindle_->isChecked() != pointer.spindle()) spindle_->setChecked(pointer.spindle());
+  if (std::abs(pointer.push_n() - properties_->chosen().push_n) >= 1.0) tour_->did(TourStep::strength);
   gauges_->show_push(pointer.push_n());
   properties_->show_push(pointer.push_n());
   pointer_->send(pointer.input());
@@ -617,6 +659,7 @@ void MainWindow::mark_before(const QString& what) {
 }
 
 void MainWindow::undo() {
+  tour_->did(TourStep::undo);
   if (undo_points_.empty()) return ask([](RoomSubscription& room) { return room.undo(1); }, tr("Undone."));
   const RoomSeq to = undo_points_.back();
   undo_points_.pop_back();
@@ -664,6 +707,7 @@ void MainWindow::show_help() {
 void MainWindow::refresh_gauges() {
   if (!room_) return;
   if (const auto failed = room_->failure_seen()) return room_ended(QString::fromStdString(failed->message));
+  sound_control_->refresh();
   connection_->setText(room_->interrupted() ? tr("Connection lost, trying again")
                                             : tr("Connected to %1").arg(address_));
   const std::optional<PointerOutput> hand = pointer_ ? pointer_->newest() : std::nullopt;
@@ -678,6 +722,45 @@ void MainWindow::refresh_gauges() {
   }
   if (pointer_) device_->setText(pointer_->connected() ? tr("Pointer") : tr("The pointer's device is away"));
   if (hand && !hand->trouble.empty()) say(QString::fromStdString(hand->trouble));
+}
+
+ConnectionState MainWindow::connections() {
+  if (room_) room_->ping();
+  ConnectionState state;
+  state.address = address_;
+  state.room = room_name_;
+  state.practice = practice_ != nullptr;
+  state.watching = watching_;
+  state.joined = room_ && room_->joined();
+  state.interrupted = room_ && room_->interrupted();
+  if (room_) state.round_trip_ms = room_->round_trip_ms();
+  if (practice_) {
+    state.server = practice_->server_state();
+    state.haptic = practice_->haptic_state();
+    state.audio = practice_->audio_state();
+  }
+  if (pointer_) {
+    state.pointer_connected = pointer_->connected();
+    state.hand = pointer_->newest();
+    if (const auto silence = pointer_->silence()) state.pointer_silence_ms = silence->count();
+  }
+  state.sound_on = sound_control_->on();
+  state.sound = sound_control_->report();
+  return state;
+}
+
+void MainWindow::keyPressEvent(QKeyEvent* event) {
+  // Reached where no part of the window has a use for Escape.
+  if (event->key() == Qt::Key_Escape) return tour_->end();
+  QMainWindow::keyPressEvent(event);
+}
+
+void MainWindow::showEvent(QShowEvent* event) {
+  QMainWindow::showEvent(event);
+  // Later, when the parts have their places.
+  QTimer::singleShot(0, this, [this] {
+    if (!watching_) tour_->begin_once();
+  });
 }
 
 void MainWindow::closeEvent(QCloseEvent* event) {

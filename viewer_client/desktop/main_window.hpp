@@ -27,9 +27,12 @@ class BoneView;
 class ClippingPanel;
 class GaugesPanel;
 class PropertiesPanel;
+class SoundControl;
 class StartPage;
 class SurgeryToolBar;
+class Tour;
 class ViewOptions;
+struct ConnectionState;
 
 // A room on a server that others run.
 struct RoomAddress {
@@ -65,6 +68,8 @@ class MainWindow : public QMainWindow {
   void closeEvent(QCloseEvent* event) override;
   void dragEnterEvent(QDragEnterEvent* event) override;
   void dropEvent(QDropEvent* event) override;
+  void keyPressEvent(QKeyEvent* event) override;
+  void showEvent(QShowEvent* event) override;
 
  private:
   // An action in a menu. `in_room`: it is of use in a room only.
@@ -102,6 +107,7 @@ class MainWindow : public QMainWindow {
   void save_picture();
   void show_help();
   void refresh_gauges();
+  [[nodiscard]] ConnectionState connections();
   void say(const QString& sentence);
   void enable_room_actions(bool on);
   void set_watching(bool on);
@@ -114,6 +120,8 @@ class MainWindow : public QMainWindow {
   PropertiesPanel* properties_ = nullptr;
   ClippingPanel* clipping_ = nullptr;
   ViewOptions* view_options_ = nullptr;
+  SoundControl* sound_control_ = nullptr;
+  Tour* tour_ = nullptr;
   QLabel *position_ = nullptr, *device_ = nullptr, *connection_ = nullptr;
   std::vector<QAction*> room_actions_;
   QAction *sound_ = nullptr, *spindle_ = nullptr;
@@ -128,7 +136,7 @@ class MainWindow : public QMainWindow {
   std::string first_tool_;            // that the hand takes in the next room; empty: none
   bool watching_ = false;
   std::string placing_;  // the item that the next click places
-  QString address_;
+  QString address_, room_name_;
   QTimer gauge_timer_, pointer_timer_;
   QElapsedTimer clock_;
 };

@@ -50,6 +50,18 @@ void PracticeRoom::start() {
   start_server();
 }
 
+ProgramState PracticeRoom::state_of(const ChildProcess* child, const Past& past) {
+  using Phase = ProgramState::Phase;
+  ProgramState state{Phase::off, past.restarts, past.why};
+  if (child != nullptr && child->state() != QProcess::NotRunning)
+    state.phase = Phase::runs;
+  else if (past.given_up)
+    state.phase = Phase::ended;
+  else if (child != nullptr)
+    state.phase = Phase::starts_again;
+  return state;
+}
+
 void PracticeRoom::start_server() {
   QFile::remove(address_file());
   server_ = std::make_unique<ChildProcess>(log_file("osteon-server"));
@@ -96,36 +108,44 @@ void PracticeRoom::start_haptic() {
 void PracticeRoom::start_audio() {
   audio_ = std::make_unique<ChildProcess>(log_file("osteon-audio"));
   connect(audio_.get(), QOverload<int, QProcess::ExitStatus>::of(&QProcess::finished), this, [this] { audio_ended(); });
-  audio_->start(program_path("osteon-audio"),
-                {"--server", address_, "--plain", "--output", "pulse", "--timeout", "60"});
+  audio_->start(program_path("osteon-audio"), {"--server", address_, "--plain", "--output", "pulse", "--window",
+                                               text_of(options_.sound_socket), "--timeout", "60"});
+  QTimer::singleShot(kSettled_ms, audio_.get(), [this] { audio_deaths_ = 0; });
 }
 
-void PracticeRoom::set_sound(bool on) {
-  options_.sound = on;
-  if (!on) audio_.reset();
-  if (on && !audio_ && !address_.isEmpty()) start_audio();
+void PracticeRoom::want_sound() {
+  options_.sound = true;
+  if (!audio_ && !address_.isEmpty()) start_audio();
 }
 
 void PracticeRoom::server_ended() {
   if (over_) return;
   address_timer_.stop();
-  const QString why = server_->last_sentence();
+  const QString why = server_past_.why = server_->last_sentence();
   if (++server_deaths_ >= kMostDeaths || address_.isEmpty()) return fail(why.isEmpty() ? tr("The server ended.") : why);
   events_.notice(tr("The server ended and starts again. Nothing that it acknowledged is lost."));
+  ++server_past_.restarts;
   QTimer::singleShot(kRestart_ms, this, [this] { start_server(); });
 }
 
 void PracticeRoom::haptic_ended() {
   if (over_) return;
-  const QString why = haptic_->last_sentence();
+  const QString why = haptic_past_.why = haptic_->last_sentence();
   if (++haptic_deaths_ >= kMostDeaths) return fail(why.isEmpty() ? tr("The haptic client ended.") : why);
   events_.notice(tr("The haptic client ended and starts again."));
+  ++haptic_past_.restarts;
   QTimer::singleShot(kRestart_ms, this, [this] { start_haptic(); });
 }
 
 void PracticeRoom::audio_ended() {
-  if (over_ || !options_.sound) return;
-  events_.notice(tr("There is no sound: %1").arg(audio_->last_sentence()));
+  if (over_) return;
+  audio_past_.why = audio_->last_sentence();
+  if (++audio_deaths_ >= kMostDeaths) {
+    audio_past_.given_up = true;
+    return events_.notice(tr("There is no sound: %1").arg(audio_past_.why));
+  }
+  ++audio_past_.restarts;
+  QTimer::singleShot(kRestart_ms, this, [this] { start_audio(); });
 }
 
 }  // namespace osteon

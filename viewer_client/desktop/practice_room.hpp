@@ -10,6 +10,7 @@
 #include <memory>
 
 #include "viewer_client/desktop/child_process.hpp"
+#include "viewer_client/desktop/connection_panel.hpp"
 
 namespace osteon {
 
@@ -18,7 +19,8 @@ struct PracticeOptions {
   std::filesystem::path folder;   // of the session: journal, logs. It is made if it is missing.
   std::filesystem::path cache;    // where the haptic client keeps cases
   std::filesystem::path pointer;  // socket of the window's pointer
-  QString tool;                   // that the hand holds first
+  std::filesystem::path sound_socket;
+  QString tool;  // that the hand holds first
   bool sound = true;
 };
 
@@ -37,9 +39,21 @@ class PracticeRoom : public QObject {
   ~PracticeRoom() override;  // ends the clients first, then the server
 
   void start();
-  void set_sound(bool on);
+  [[nodiscard]] ProgramState server_state() const { return state_of(server_.get(), server_past_); }
+  [[nodiscard]] ProgramState haptic_state() const { return state_of(haptic_.get(), haptic_past_); }
+  [[nodiscard]] ProgramState audio_state() const { return state_of(audio_.get(), audio_past_); }
+  // Starts the audio client when the sound is wanted for the first time. Its socket switches it off and on again.
+  void want_sound();
 
  private:
+  // What became of a program before.
+  struct Past {
+    int restarts = 0;
+    QString why;  // it ended last
+    bool given_up = false;
+  };
+
+  [[nodiscard]] static ProgramState state_of(const ChildProcess* child, const Past& past);
   void start_server();
   void look_for_address();
   void start_haptic();
@@ -56,8 +70,9 @@ class PracticeRoom : public QObject {
   QTimer address_timer_;
   QString address_;
   // of children that died soon after their start, one after the other
-  int server_deaths_ = 0, haptic_deaths_ = 0;
+  int server_deaths_ = 0, haptic_deaths_ = 0, audio_deaths_ = 0;
   bool over_ = false;
+  Past server_past_, haptic_past_, audio_past_;
   std::unique_ptr<ChildProcess> server_, haptic_, audio_;
 };
 

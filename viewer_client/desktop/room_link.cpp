@@ -66,6 +66,24 @@ void RoomLink::look(const ViewFrustum& from) {
   if (subscription_) subscription_->look(from);
 }
 
+// The time is that of the request alone, without its wait for others before it.
+void RoomLink::ping() {
+  if (!joined() || interrupted() || pinging_) return;
+  pinging_ = true;
+  const auto took_ms = std::make_shared<double>(0.0);  // of the own thread, then of the GUI thread
+  ask(
+      [took_ms](RoomSubscription& room) {
+        const auto start = std::chrono::steady_clock::now();
+        Result<RoomAnswer> answer = room.ping();
+        *took_ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+        return answer;
+      },
+      [this, took_ms](const Result<RoomAnswer>& answer) {
+        pinging_ = false;
+        round_trip_ms_ = answer ? std::optional(*took_ms) : std::nullopt;
+      });
+}
+
 std::optional<Error> RoomLink::failure_seen() const {
   return subscription_ ? subscription_->failure_seen() : std::nullopt;
 }

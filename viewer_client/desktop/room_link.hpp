@@ -35,6 +35,9 @@ class RoomLink : public QObject {
   void ask(Request request, Answered answered);
   // The window's view; returns at once.
   void look(const ViewFrustum& from);
+  // Asks the server something without an effect, unless the answer to the last time is still to come.
+  void ping();
+  [[nodiscard]] std::optional<double> round_trip_ms() const { return round_trip_ms_; }  // of the newest answer
   [[nodiscard]] RenderQueue& queue() { return queue_; }
   [[nodiscard]] bool joined() const { return subscription_ != nullptr; }
   [[nodiscard]] bool interrupted() const { return subscription_ && subscription_->interrupted(); }
@@ -49,6 +52,9 @@ class RoomLink : public QObject {
   RenderQueue queue_;
   // Made by the own thread; the GUI thread has it from then on. Its functions may be called by both.
   std::unique_ptr<RoomSubscription> subscription_;
+
+  std::optional<double> round_trip_ms_;
+  bool pinging_ = false;
 
   std::atomic<bool> stop_ = false;
   Mutex mutex_{LockRank::leaf};

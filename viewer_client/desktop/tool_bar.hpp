@@ -9,6 +9,7 @@
 class QAction;
 class QActionGroup;
 class QMenu;
+class QToolButton;
 
 namespace osteon {
 
@@ -29,7 +30,7 @@ class SurgeryToolBar : public QToolBar {
   std::function<void(const std::string&)> taken_;
   QActionGroup* group_;
   std::map<std::string, QAction*> actions_;
-  std::map<std::string, class QToolButton*> buttons_;  // of a tool's group
+  std::map<std::string, QToolButton*> buttons_;  // of a tool's group
 };
 
 }  // namespace osteon

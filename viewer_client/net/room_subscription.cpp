@@ -464,6 +464,11 @@ void RoomSubscription::look(const ViewFrustum& from) {
 
 bool RoomSubscription::interrupted() const { return impl_->interrupted.load(); }
 
+Result<RoomAnswer> RoomSubscription::ping() {
+  const auto answer = ask(joined().channel, &v1::RoomService::Stub::ListTools, v1::ListToolsRequest{});
+  return answer ? Result<RoomAnswer>(RoomAnswer{}) : tl::unexpected(answer.error());
+}
+
 Result<RoomAnswer> RoomSubscription::undo(std::uint32_t count) {
   v1::UndoRequest request;
   request.set_count(count);

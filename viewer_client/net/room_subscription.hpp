@@ -58,6 +58,7 @@ class RoomSubscription {
 
   // Requests to the room. Each waits for the answer. Errors: invalid_input, not_found (no such tool or item),
   // unavailable (nothing to undo, no answer).
+  [[nodiscard]] Result<RoomAnswer> ping();  // a question without an effect, to see how long the answer takes
   [[nodiscard]] Result<RoomAnswer> undo(std::uint32_t count);
   [[nodiscard]] Result<RoomAnswer> undo_to(RoomSeq mark);
   [[nodiscard]] Result<RoomAnswer> mark(const std::string& label);

@@ -4,6 +4,7 @@
 #include <sndfile.h>
 
 #include <chrono>
+#include <cmath>
 #include <cstdlib>
 #include <filesystem>
 #include <set>
@@ -11,7 +12,9 @@
 #include <vector>
 
 #include "audio_client/output/audio_output.hpp"
+#include "audio_client/output/kept_output.hpp"
 #include "audio_client/output/sound_engine.hpp"
+#include "audio_client/output/volume_ramp.hpp"
 #include "common/sound/levels.hpp"
 #include "tests/support/allocation_counter.hpp"
 #include "tests/support/temp_dir.hpp"
@@ -82,11 +85,129 @@ TEST(SoundEngine, RenderDoesNotAllocateEvenWhileRecording) {
   const test::ScriptedDrilling script = test::scripted_drilling();
   for (const CuttingState& state : script.states) scenes.push_back(scene_of(state, 1));
   const test::AllocationCounter heap;
+  double volume = 0.0;
   for (const SoundScene& scene : scenes) {
     engine.deliver(scene);
+    engine.set_volume(volume = 1.0 - volume);
     engine.render(frames);
+    static_cast<void>(engine.wave());
+    static_cast<void>(engine.take_level());
+    static_cast<void>(engine.take_longest_work());
   }
   EXPECT_EQ(heap.count(), 0);
+}
+
+// A factor moves by 1 / (rate * 30 ms) in a sample, so of a constant 1 the largest step between samples is that, and
+// the way from factor a to b takes |a - b| * rate * 30 ms samples.
+TEST(VolumeRamp, AConstantFollowsAStraightLineFromOneVolumeToTheNext) {
+  for (const double rate_hz : {44100.0, 48000.0}) {
+    VolumeRamp ramp(rate_hz);
+    double factor = 1.0;
+    for (const double wanted : {0.0, 1.0, 0.25, 0.75, 0.75}) {
+      std::vector<float> mono(4096, 1.0F);
+      // In two buffers: a ramp goes on where the one before ended.
+      ramp.apply(std::span(mono).first(100), wanted);
+      ramp.apply(std::span(mono).subspan(100), wanted);
+      const double whole = 0.03 * rate_hz;
+      for (std::size_t i = 0; i < mono.size(); ++i) {
+        const double way = std::min(static_cast<double>(i + 1) / whole, std::abs(wanted - factor));
+        ASSERT_NEAR(mono[i], factor + std::copysign(way, wanted - factor), 1e-6) << wanted << " " << i;
+      }
+      factor = wanted;
+    }
+  }
+}
+
+// y[n] - y[n-1] = g[n] (x[n] - x[n-1]) + (g[n] - g[n-1]) x[n-1], so a sine of amplitude A and frequency f has no larger
+// step than A 2 sin(pi f / rate) + A / (rate * 30 ms), however the volume jumps.
+TEST(VolumeRamp, ASineHasNoStepBeyondItsOwnAndTheRamps) {
+  constexpr double kRate_hz = 48000.0, kSine_hz = 440.0, kAmplitude = 0.5, kPi = 3.14159265358979323846;
+  VolumeRamp ramp(kRate_hz);
+  std::vector<float> mono(48000);
+  for (std::size_t i = 0; i < mono.size(); ++i)
+    mono[i] = static_cast<float>(kAmplitude * std::sin(2.0 * kPi * kSine_hz * static_cast<double>(i) / kRate_hz));
+  const double volumes[] = {0.0, 1.0, 0.3, 1.0, 0.0, 0.6};
+  for (std::size_t at = 0, turn = 0; at < mono.size(); at += 256, ++turn)
+    ramp.apply(std::span(mono).subspan(at, std::min<std::size_t>(256, mono.size() - at)), volumes[turn % 6]);
+  double largest = 0.0;
+  for (std::size_t i = 1; i < mono.size(); ++i)
+    largest = std::max(largest, static_cast<double>(std::abs(mono[i] - mono[i - 1])));
+  EXPECT_LE(largest, kAmplitude * (2.0 * std::sin(kPi * kSine_hz / kRate_hz) + 1.0 / (0.03 * kRate_hz)) + 1e-6);
+  EXPECT_GT(largest, 0.0);
+}
+
+TEST(SoundEngine, TheListenerHearsTheVolumeAndSeesWhatWasPlayed) {
+  SoundEngine loud(SynthParams{}), half(SynthParams{});
+  half.set_volume(0.5);
+  std::vector<float> a(300), b(300), heard;
+  CuttingState state = test::cortical_drill(1345);
+  float level = 0.0F;
+  for (int turn = 0; turn < 40; ++turn) {
+    for (SoundEngine* engine : {&loud, &half}) engine->deliver(scene_of(state, 1));
+    loud.render(a);
+    half.render(b);
+    ++state.state_seq;
+    heard.insert(heard.end(), b.begin(), b.end());
+    for (const float x : b) level = std::max(level, std::abs(x));
+    if (turn < 10) continue;
+    // Beyond the ramp, of 1440 samples.
+    for (std::size_t i = 0; i < a.size(); ++i) ASSERT_NEAR(b[i], 0.5F * a[i], 1e-6F);
+  }
+  EXPECT_GT(level, 0.01F);
+  const SoundEngine::Wave& wave = half.wave();
+  EXPECT_TRUE(std::equal(wave.begin(), wave.end(), heard.end() - static_cast<std::ptrdiff_t>(wave.size())));
+  EXPECT_EQ(half.take_level(), level);
+  EXPECT_EQ(half.take_level(), 0.0F) << "since the last call";
+  EXPECT_EQ(half.buffer_frames(), 300U);
+  EXPECT_EQ(half.take_longest_work().count() / 1000, static_cast<std::int64_t>(half.work().max_us()));
+  EXPECT_EQ(half.take_longest_work().count(), 0);
+  EXPECT_EQ(half.peak(), loud.peak()) << "what is recorded has the full volume";
+}
+
+// A device that a test takes away.
+struct StandInOutput final : AudioOutput {
+  explicit StandInOutput(std::string& why) : why_(why) {}
+  Result<void> start() override { return {}; }
+  void stop() noexcept override {}
+  std::chrono::nanoseconds latency() const noexcept override { return 7ms; }
+  std::uint64_t gaps() const noexcept override { return 2; }
+  std::string failure_reason() const override { return why_; }
+
+ private:
+  std::string& why_;
+};
+
+TEST(KeptOutput, IsOpenedAgainAfterItsDeviceCameBack) {
+  std::string why;
+  bool there = false;
+  int attempts = 0;
+  KeptOutput output([&]() -> Result<std::unique_ptr<AudioOutput>> {
+    ++attempts;
+    if (!there) return failure(ErrorCode::unavailable, "no device");
+    return std::make_unique<StandInOutput>(why);
+  });
+  EXPECT_FALSE(output.open());
+  EXPECT_EQ(output.trouble(), "no device");
+  const auto start = KeptOutput::Clock::now();
+  output.keep(start, false);
+  EXPECT_EQ(attempts, 1) << "not wanted";
+  output.keep(start, true);
+  output.keep(start + 1s, true);
+  EXPECT_EQ(attempts, 2) << "not at each call";
+  there = true;
+  output.keep(start + 3s, true);
+  EXPECT_EQ(output.trouble(), "");
+  EXPECT_EQ(output.latency(), 7ms);
+  output.keep(start + 9s, true);
+  EXPECT_EQ(attempts, 3) << "it plays";
+  why = "the sound server went away";
+  output.keep(start + 10s, true);
+  EXPECT_EQ(output.trouble(), why);
+  EXPECT_EQ(output.latency(), 0ms);
+  why.clear();
+  output.keep(start + 13s, true);
+  EXPECT_EQ(output.trouble(), "");
+  EXPECT_EQ(output.gaps(), 4U) << "of both";
 }
 
 TEST(PacedOutput, AsksForFramesAtTheSoundCardsPace) {

@@ -63,6 +63,161 @@
     </message>
 </context>
 <context>
+    <name>ConnectionPanel</name>
+    <message>
+        <source>%1 ms</source>
+        <translation>%1 ms</translation>
+    </message>
+    <message>
+        <source>not started</source>
+        <translation>nicht gestartet</translation>
+    </message>
+    <message>
+        <source>starts again</source>
+        <translation>startet wieder</translation>
+    </message>
+    <message>
+        <source>ended</source>
+        <translation>beendet</translation>
+    </message>
+    <message>
+        <source>runs</source>
+        <translation>läuft</translation>
+    </message>
+    <message>
+        <source>not connected</source>
+        <translation>nicht verbunden</translation>
+    </message>
+    <message>
+        <source>connection lost, trying again</source>
+        <translation>Verbindung verloren, neuer Versuch</translation>
+    </message>
+    <message>
+        <source>answers in %1</source>
+        <translation>antwortet in %1</translation>
+    </message>
+    <message>
+        <source>connected</source>
+        <translation>verbunden</translation>
+    </message>
+    <message>
+        <source>not in this window</source>
+        <translation>nicht in diesem Fenster</translation>
+    </message>
+    <message>
+        <source>heard %1 ago</source>
+        <translation>gehört vor %1</translation>
+    </message>
+    <message>
+        <source>none</source>
+        <translation>keines</translation>
+    </message>
+    <message>
+        <source>mouse, not connected yet</source>
+        <translation>Maus, noch nicht verbunden</translation>
+    </message>
+    <message>
+        <source>mouse, makes its tools ready</source>
+        <translation>Maus, bereitet die Werkzeuge vor</translation>
+    </message>
+    <message>
+        <source>mouse, at %1, %2, %3 mm</source>
+        <translation>Maus, bei %1, %2, %3 mm</translation>
+    </message>
+    <message>
+        <source>switched off</source>
+        <translation>ausgeschaltet</translation>
+    </message>
+    <message>
+        <source>%1 late</source>
+        <translation>%1 später</translation>
+    </message>
+    <message>
+        <source>no device</source>
+        <translation>kein Gerät</translation>
+    </message>
+    <message>
+        <source>Open a bone or join a room.</source>
+        <translation>Öffnen Sie einen Knochen oder betreten Sie einen Raum.</translation>
+    </message>
+    <message>
+        <source>Check the network to %1. The window connects again by itself.</source>
+        <translation>Prüfen Sie das Netz zu %1. Das Fenster verbindet sich von selbst wieder.</translation>
+    </message>
+    <message>
+        <source>%1 said: %2</source>
+        <translation>%1 meldete: %2</translation>
+    </message>
+    <message>
+        <source>Wait some seconds: the haptic client makes its tools ready.</source>
+        <translation>Warten Sie einige Sekunden: Das Haptikprogramm bereitet die Werkzeuge vor.</translation>
+    </message>
+    <message>
+        <source>The haptic client is silent. End what else keeps this computer busy.</source>
+        <translation>Das Haptikprogramm schweigt. Beenden Sie, was den Rechner sonst auslastet.</translation>
+    </message>
+    <message>
+        <source>No sound device: %1</source>
+        <translation>Kein Tongerät: %1</translation>
+    </message>
+    <message>
+        <source>Without loudspeakers, switch the sound off: Tools &gt; Sound.</source>
+        <translation>Ohne Lautsprecher schalten Sie den Ton aus: Werkzeuge &gt; Ton.</translation>
+    </message>
+    <message>
+        <source>You practise alone.</source>
+        <translation>Sie üben allein.</translation>
+    </message>
+    <message>
+        <source>You watch.</source>
+        <translation>Sie sehen zu.</translation>
+    </message>
+    <message>
+        <source>You are a guest with a view.</source>
+        <translation>Sie sind Gast und sehen zu.</translation>
+    </message>
+    <message>
+        <source>Room</source>
+        <translation>Raum</translation>
+    </message>
+    <message>
+        <source>Your role</source>
+        <translation>Ihre Rolle</translation>
+    </message>
+    <message>
+        <source>The server</source>
+        <translation>Der Server</translation>
+    </message>
+    <message>
+        <source>Haptic client</source>
+        <translation>Haptikprogramm</translation>
+    </message>
+    <message>
+        <source>Its device</source>
+        <translation>Sein Gerät</translation>
+    </message>
+    <message>
+        <source>Audio client</source>
+        <translation>Tonprogramm</translation>
+    </message>
+    <message>
+        <source>What to do</source>
+        <translation>Was zu tun ist</translation>
+    </message>
+    <message>
+        <source>%1 at %2</source>
+        <translation>%1 auf %2</translation>
+    </message>
+    <message>
+        <source>Nothing. All works.</source>
+        <translation>Nichts. Alles arbeitet.</translation>
+    </message>
+    <message>
+        <source>started again: %1</source>
+        <translation>neu gestartet: %1</translation>
+    </message>
+</context>
+<context>
     <name>GaugesPanel</name>
     <message>
         <source>Push</source>
@@ -592,6 +747,18 @@
         <source>the left button and the wheel move the view</source>
         <translation>Linke Taste und Rad bewegen die Ansicht</translation>
     </message>
+    <message>
+        <source>&amp;Volume and wave form…</source>
+        <translation>&amp;Lautstärke und Wellenform…</translation>
+    </message>
+    <message>
+        <source>Connections</source>
+        <translation>Verbindungen</translation>
+    </message>
+    <message>
+        <source>&amp;Tour</source>
+        <translation>&amp;Rundgang</translation>
+    </message>
 </context>
 <context>
     <name>PracticeRoom</name>
@@ -721,6 +888,92 @@
     <message>
         <source>%1 N</source>
         <translation>%1 N</translation>
+    </message>
+</context>
+<context>
+    <name>SoundControl</name>
+    <message>
+        <source>There is no sound: %1</source>
+        <translation>Es gibt keinen Ton: %1</translation>
+    </message>
+    <message>
+        <source>There is sound in a room to practise in. Open a bone first.</source>
+        <translation>Ton gibt es in einem Übungsraum. Öffnen Sie zuerst einen Knochen.</translation>
+    </message>
+    <message>
+        <source>The audio client has not said anything yet.</source>
+        <translation>Das Tonprogramm hat sich noch nicht gemeldet.</translation>
+    </message>
+    <message>
+        <source>The sound is off.</source>
+        <translation>Der Ton ist aus.</translation>
+    </message>
+</context>
+<context>
+    <name>SoundDialog</name>
+    <message>
+        <source>Sound</source>
+        <translation>Ton</translation>
+    </message>
+    <message>
+        <source>&amp;Play the sound</source>
+        <translation>Ton &amp;abspielen</translation>
+    </message>
+    <message>
+        <source>Volume</source>
+        <translation>Lautstärke</translation>
+    </message>
+    <message>
+        <source>%1 %</source>
+        <translation>%1 %</translation>
+    </message>
+    <message>
+        <source>&amp;Volume</source>
+        <translation>&amp;Lautstärke</translation>
+    </message>
+    <message>
+        <source>Level</source>
+        <translation>Pegel</translation>
+    </message>
+    <message>
+        <source>Computing time of a buffer</source>
+        <translation>Rechenzeit je Puffer</translation>
+    </message>
+    <message>
+        <source>From the tool to the ear, at most</source>
+        <translation>Vom Werkzeug zum Ohr, höchstens</translation>
+    </message>
+    <message>
+        <source>Gaps</source>
+        <translation>Aussetzer</translation>
+    </message>
+    <message>
+        <source>Device</source>
+        <translation>Gerät</translation>
+    </message>
+    <message>
+        <source>Close</source>
+        <translation>Schließen</translation>
+    </message>
+    <message>
+        <source>silent</source>
+        <translation>still</translation>
+    </message>
+    <message>
+        <source>%1 dB</source>
+        <translation>%1 dB</translation>
+    </message>
+    <message>
+        <source>%1 of %2 ms</source>
+        <translation>%1 von %2 ms</translation>
+    </message>
+    <message>
+        <source>%1 ms</source>
+        <translation>%1 ms</translation>
+    </message>
+    <message>
+        <source>No sound device: %1</source>
+        <translation>Kein Tongerät: %1</translation>
     </message>
 </context>
 <context>
@@ -938,6 +1191,45 @@
     </message>
 </context>
 <context>
+    <name>Tour</name>
+    <message>
+        <source>&amp;Next step</source>
+        <translation>&amp;Nächster Schritt</translation>
+    </message>
+    <message>
+        <source>End the tour</source>
+        <translation>Rundgang beenden</translation>
+    </message>
+    <message>
+        <source>Open a bone: click on the skull, or choose it with the arrow keys and press Enter.</source>
+        <translation>Knochen öffnen: Schädel anklicken, oder mit Pfeiltasten wählen und Eingabetaste.</translation>
+    </message>
+    <message>
+        <source>Take a tool: click on the drill in this bar, or choose it in the menu Tools.</source>
+        <translation>Werkzeug nehmen: in dieser Leiste den Bohrer anklicken, oder im Menü Werkzeuge.</translation>
+    </message>
+    <message>
+        <source>Point at the bone and hold the left button. A hand then pushes the tool in.</source>
+        <translation>Auf den Knochen zeigen, linke Taste halten: Eine Hand drückt das Werkzeug hinein.</translation>
+    </message>
+    <message>
+        <source>Turn the wheel over the bone, or change this number: it is how hard the hand pushes.</source>
+        <translation>Mausrad über dem Knochen, oder diese Zahl ändern: So stark drückt die Hand.</translation>
+    </message>
+    <message>
+        <source>Undo, also Ctrl+Z, takes back the last push. Help &gt; Tour shows these steps again.</source>
+        <translation>Rückgängig (Strg+Z) nimmt den letzten Druck zurück. Der Rundgang: Menü Hilfe.</translation>
+    </message>
+    <message>
+        <source>Step %1 of %2</source>
+        <translation>Schritt %1 von %2</translation>
+    </message>
+    <message>
+        <source>&amp;Done</source>
+        <translation>&amp;Fertig</translation>
+    </message>
+</context>
+<context>
     <name>ViewOptions</name>
     <message>
         <source>Cube of the patient&apos;s sides</source>
@@ -990,6 +1282,17 @@
     <message>
         <source>Kept as view %1.</source>
         <translation>Als Ansicht %1 gemerkt.</translation>
+    </message>
+</context>
+<context>
+    <name>WavePlot</name>
+    <message>
+        <source>Wave form of the sound</source>
+        <translation>Wellenform des Tons</translation>
+    </message>
+    <message>
+        <source>%1 ms</source>
+        <translation>%1 ms</translation>
     </message>
 </context>
 </TS>

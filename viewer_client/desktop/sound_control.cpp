@@ -1,0 +1,81 @@
+#include "viewer_client/desktop/sound_control.hpp"
+
+#include <QSettings>
+#include <algorithm>
+#include <utility>
+
+namespace osteon {
+
+namespace {
+constexpr const char* kOnKey = "sound/on";
+constexpr const char* kVolumeKey = "sound/volume";  // percent
+}  // namespace
+
+SoundControl::SoundControl(Events events, QWidget* window)
+    : QObject(window), events_(std::move(events)), window_(window) {
+  const QSettings settings;
+  chosen_.on = settings.value(kOnKey, true).toBool();
+  chosen_.percent = std::clamp(settings.value(kVolumeKey, 100).toInt(), 0, 100);
+}
+
+Result<void> SoundControl::listen(const std::filesystem::path& socket) {
+  auto made = SoundServer::listen(socket);
+  if (!made) return tl::unexpected(made.error());
+  server_ = std::move(*made);
+  return {};
+}
+
+void SoundControl::close() {
+  server_.reset();
+  trouble_.clear();
+  refresh();
+}
+
+void SoundControl::choose(const SoundDialog::Chosen& chosen) {
+  const bool switched = chosen.on != chosen_.on;
+  chosen_ = chosen;
+  QSettings settings;
+  settings.setValue(kOnKey, chosen_.on);
+  settings.setValue(kVolumeKey, chosen_.percent);
+  send();
+  if (switched) events_.switched(chosen_.on);
+}
+
+void SoundControl::set_on(bool on) {
+  if (dialog_ != nullptr) dialog_->set_on(on);
+  choose({on, chosen_.percent});
+}
+
+void SoundControl::show_dialog() {
+  if (dialog_ == nullptr)
+    dialog_ = new SoundDialog(
+        chosen_, [this](const SoundDialog::Chosen& chosen) { choose(chosen); }, window_);
+  refresh();
+  dialog_->show();
+  dialog_->raise();
+  dialog_->activateWindow();
+}
+
+void SoundControl::send() {
+  if (server_) server_->send({amplitude_of(chosen_.percent), chosen_.on});
+}
+
+void SoundControl::refresh() {
+  send();
+  const std::optional<SoundReport> heard = report();
+  if (heard && heard->trouble != trouble_) {
+    trouble_ = heard->trouble;
+    if (!trouble_.empty() && chosen_.on)
+      events_.notice(tr("There is no sound: %1").arg(QString::fromStdString(trouble_)));
+  }
+  if (dialog_ != nullptr && dialog_->isVisible()) dialog_->show_report(heard, missing());
+}
+
+QString SoundControl::missing() const {
+  if (!server_) return tr("There is sound in a room to practise in. Open a bone first.");
+  return chosen_.on ? tr("The audio client has not said anything yet.") : tr("The sound is off.");
+}
+
+std::optional<SoundReport> SoundControl::report() { return server_ ? server_->newest() : std::nullopt; }
+
+}  // namespace osteon
