@@ -25,6 +25,7 @@ struct ToolOperatorOptions {
   std::optional<std::string> law;
   std::optional<double> wear;
   DeviceOptions devices;
+  std::optional<ForceChoice> force_choice;  // default: proportional, or as it was recorded
 };
 
 class ToolOperator {
