@@ -18,6 +18,7 @@
 #include <QSpinBox>
 #include <QStackedWidget>
 #include <QStatusBar>
+#include <QTabletEvent>
 #include <QTest>
 #include <QToolButton>
 #include <QUrl>
@@ -203,6 +204,46 @@ TEST_F(WindowTest, WheelSpaceAndShiftSetPushSpindleAndFineMotion) {
   EXPECT_TRUE(view_->pointer().input().fine);
   QTest::keyRelease(view_, Qt::Key_Shift);
   EXPECT_FALSE(view_->pointer().input().fine);
+}
+
+TEST_F(WindowTest, APenPushesAsHardAsItIsPressed) {
+  open();
+  click_tool("drill");
+  hover(middle());
+  ASSERT_TRUE(until([&] { return view_->pointer().on_bone(); }));
+  view_->pointer().set_push(12.0);
+  const auto pen = [&](QEvent::Type type, const QPoint& at, double pressure, Qt::MouseButton button,
+                       Qt::MouseButtons buttons) {
+    QTabletEvent event(type, at, view_->mapToGlobal(at), QTabletEvent::Stylus, QTabletEvent::Pen, pressure, 0, 0, 0.0,
+                       0.0, 0, Qt::NoModifier, 1, button, buttons);
+    QApplication::sendEvent(view_, &event);
+    return event.isAccepted();
+  };
+  // In the air over the tablet it points and does not push.
+  EXPECT_TRUE(pen(QEvent::TabletMove, middle() + QPoint(20, 0), 0.0, Qt::NoButton, Qt::NoButton));
+  EXPECT_FALSE(view_->pointer().pushing());
+  EXPECT_EQ(view_->pointer().push_n(), 12.0);
+  // From 1 to 40 N, in proportion to the pressure: 1 + 39 p.
+  EXPECT_TRUE(pen(QEvent::TabletPress, middle(), 0.0, Qt::LeftButton, Qt::LeftButton));
+  EXPECT_TRUE(view_->pointer().pushing());
+  EXPECT_DOUBLE_EQ(view_->pointer().push_n(), 1.0);
+  for (const double pressure : {0.5, 1.0, 0.25}) {
+    EXPECT_TRUE(pen(QEvent::TabletMove, middle(), pressure, Qt::NoButton, Qt::LeftButton));
+    EXPECT_DOUBLE_EQ(view_->pointer().push_n(), 1.0 + 39.0 * pressure);
+    EXPECT_DOUBLE_EQ(view_->pointer().input().push_n, view_->pointer().push_n());
+  }
+  EXPECT_TRUE(until([&] { return cut(); })) << problem();
+  // Lifted, it leaves the push that the wheel has set.
+  EXPECT_TRUE(pen(QEvent::TabletRelease, middle(), 0.0, Qt::LeftButton, Qt::NoButton));
+  EXPECT_FALSE(view_->pointer().pushing());
+  EXPECT_EQ(view_->pointer().push_n(), 12.0);
+  // The window shows what bone and hand give, and what the device holds: the simulated hand 30 N.
+  EXPECT_TRUE(until([&] { return label("budget_words").endsWith("the device holds 30.0 N."); }))
+      << label("budget_words").toStdString();
+  // Its barrel button, and a pen without a tool, are the mouse's.
+  EXPECT_FALSE(pen(QEvent::TabletPress, middle(), 0.0, Qt::RightButton, Qt::RightButton));
+  trigger("put_down");
+  EXPECT_FALSE(pen(QEvent::TabletPress, middle(), 0.5, Qt::LeftButton, Qt::LeftButton));
 }
 
 TEST_F(WindowTest, AnotherSizeOfTheToolComesIntoTheHand) {

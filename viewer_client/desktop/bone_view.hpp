@@ -1,6 +1,6 @@
 // The picture of the bone in the window, and the mouse over it. Without a tool the left button turns the bone, as in an
 // image viewer. With a tool the left button pushes, the right button turns the tool, and the wheel sets the push. The
-// middle button always moves the camera.
+// middle button always moves the camera. A pen pushes with its tip, as hard as it is pressed.
 #pragma once
 #include <QCoreApplication>
 #include <QPoint>
@@ -76,6 +76,7 @@ class BoneView : public QVTKOpenGLNativeWidget {
   void mousePressEvent(QMouseEvent* event) override;
   void mouseMoveEvent(QMouseEvent* event) override;
   void mouseReleaseEvent(QMouseEvent* event) override;
+  void tabletEvent(QTabletEvent* event) override;
   void wheelEvent(QWheelEvent* event) override;
   void leaveEvent(QEvent* event) override;
   void keyPressEvent(QKeyEvent* event) override;
@@ -91,6 +92,7 @@ class BoneView : public QVTKOpenGLNativeWidget {
   void camera_moved();
   void follow_tool();
   void pointer_moved();
+  void lift_pen();
 
   Events events_;
   std::unique_ptr<BoneScene> scene_;
@@ -103,6 +105,7 @@ class BoneView : public QVTKOpenGLNativeWidget {
   QPoint last_;             // position of the mouse, device pixels
   QPoint pressed_;          // where a button went down
   bool camera_drag_ = false;
+  std::optional<double> wheel_push_n_;  // while a pen pushes: what the wheel has set
   QString notice_;
   bool marker_ = false;
   Clipping clipping_;

@@ -153,6 +153,14 @@ class Observer {
       const double explained_n = slew_n + by_hand_n + 2.0 * s * coupling_n_per_mm_ * report.contact.moved_mm.norm();
       result_.fall_n = std::max(result_.fall_n, force_n_.norm() - force_n.norm() - explained_n);
     }
+    constexpr std::uint32_t kLess = kSlewLimited | kEnergyLimited | kRamping | kMissedTicks | kForceLimited;
+    still_ = moved_by_mm < 1e-12 && report.contact.moved_mm.isZero() ? still_ + 1 : 0;
+    if (still_ > 20 && !(report.events & (kLess | kLetGo)) && report.cutting.phase == CuttingPhase::rubbing) {
+      const double bone_n = report.coupling.force_n.norm();
+      const double shown_n = s * (knee_n > 0.0 ? knee_n * std::log(1.0 + bone_n / knee_n) : bone_n);
+      result_.still_off_n = std::max(result_.still_off_n, std::abs(force_n.norm() - shown_n));
+      result_.still += bone_n > 1.0;
+    }
     if (moved_by_mm < 1e-12 && moved_before_mm_ < 1e-12) result_.still_step_n = std::max(result_.still_step_n, step_n);
     // A turn's spring at its arm is the move's at the handle. The slew limit is at the tool's arm.
     const double turn_step_nmm = grown(torque_nmm, torque_nmm_);
@@ -216,6 +224,7 @@ class Observer {
   Vec3 force_n_ = Vec3::Zero(), torque_nmm_ = Vec3::Zero(), handle_mm_ = Vec3::Zero();
   Eigen::Quaterniond rotation_ = Eigen::Quaterniond::Identity();
   double moved_before_mm_ = 0, cut_nmm_ = 0, episode_mj_ = 0, hand_mj_ = 0, off_s_ = 0;
+  int still_ = 0;  // ticks in which neither handle nor tool moved
   bool open_ = false, first_ = true;
 };
 
@@ -379,15 +388,17 @@ void StabilityResult::add(const StabilityResult& other) {
       turned_mj += other.turned_mj;
   worst_mj = std::max(worst_mj, other.worst_mj);
   least_cutting_n_mm = std::min(least_cutting_n_mm, other.least_cutting_n_mm);
-  pushed_back += other.pushed_back;
-  for (double StabilityResult::*most :
-       {&StabilityResult::pushed_back_most_mj, &StabilityResult::step_over_n, &StabilityResult::still_step_n,
-        &StabilityResult::fall_n, &StabilityResult::motor_over_n, &StabilityResult::motor_late_n,
-        &StabilityResult::motor_most_n, &StabilityResult::force_most_n, &StabilityResult::deepest_mm,
-        &StabilityResult::turn_step_over_n, &StabilityResult::cut_step_over_n, &StabilityResult::cut_over_nmm,
-        &StabilityResult::cut_late_nmm, &StabilityResult::cut_most_nmm, &StabilityResult::torque_most_nmm,
-        &StabilityResult::torque_over_nmm, &StabilityResult::hand_worst_mj, &StabilityResult::budget_over_n,
-        &StabilityResult::cue_most_n})
+  pushed_back += other.pushed_back, still += other.still;
+  for (double StabilityResult::*most : {&StabilityResult::pushed_back_most_mj, &StabilityResult::step_over_n,
+                                        &StabilityResult::still_step_n,        &StabilityResult::fall_n,
+                                        &StabilityResult::motor_over_n,        &StabilityResult::motor_late_n,
+                                        &StabilityResult::motor_most_n,        &StabilityResult::force_most_n,
+                                        &StabilityResult::deepest_mm,          &StabilityResult::turn_step_over_n,
+                                        &StabilityResult::cut_step_over_n,     &StabilityResult::cut_over_nmm,
+                                        &StabilityResult::cut_late_nmm,        &StabilityResult::cut_most_nmm,
+                                        &StabilityResult::torque_most_nmm,     &StabilityResult::torque_over_nmm,
+                                        &StabilityResult::hand_worst_mj,       &StabilityResult::still_off_n,
+                                        &StabilityResult::budget_over_n,       &StabilityResult::cue_most_n})
     this->*most = std::max(this->*most, other.*most);
 }
 

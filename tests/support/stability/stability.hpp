@@ -34,8 +34,10 @@ struct StabilityResult {
   double hand_worst_mj = 0;  // likewise of the hand alone, without what went into cutting
   double budget_over_n = 0;  // of the whole force over the device's continuous force
   double cue_most_n = 0;
-  double net_mj = 0;              // over all contacts; negative: what the coupling took
-  double cutting_mj = 0;          // work of the cutting forces, at the handle
+  double still_off_n = 0;  // while the handle stood still: of the coupling's force from the closed form of its scaling
+  std::int64_t still = 0;  // number of such ticks with force
+  double net_mj = 0;       // over all contacts; negative: what the coupling took
+  double cutting_mj = 0;   // work of the cutting forces, at the handle
   double least_cutting_n_mm = 0;  // of all ticks' F_cut · dx
   // Ticks that had to be made rubbing for that, because turning pushed back what was cut, and the largest work that one
   // would have given.

@@ -150,8 +150,12 @@ TEST_P(CompressedForce, GivesNothingAway) {
   EXPECT_LE(r.budget_over_n, 1e-9);
   EXPECT_LE(r.motor_over_n, 1e-9);
   EXPECT_EQ(r.allocations, 0);
+  EXPECT_LE(r.still_off_n, 1e-9);
   // Otherwise the test would prove nothing.
   EXPECT_GT(r.touching, 2'000);
+  if (run.scene == StabilityScene::stroke) {
+    EXPECT_GT(r.still, 100);
+  }
   EXPECT_GT(r.force_most_n, 2.0);
   if (run.scene == StabilityScene::burr || run.scene == StabilityScene::drill) {
     EXPECT_GT(r.cutting, 1'000);
