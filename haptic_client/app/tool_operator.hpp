@@ -54,7 +54,7 @@ class ToolOperator {
   // The plan's steps, or those of the person's hand.
   Result<ReadyPlan> ready_on(const Case& bone, const ToolFinder& find) const;
   // The session of a person with a pointer.
-  Result<std::unique_ptr<Session>> pointed_on(const Case& bone, const ToolBox& tools, double force_scale);
+  Result<std::unique_ptr<Session>> pointed_on(const Case& bone, const ToolBox& tools, const ForceScaling& scaling);
   // Opens a person's devices.
   Result<void> connect(const DeviceNotice& notice);
 

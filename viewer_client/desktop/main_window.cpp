@@ -648,6 +648,7 @@ void MainWindow::show_help() {
       {tr("Mouse over the bone"), tr("the tool rests where the pointer is")},
       {tr("Left button, held"), tr("the hand pushes")},
       {tr("Wheel"), tr("how hard the hand pushes")},
+      {tr("Pen"), tr("its tip pushes, as hard as you press it")},
       {tr("Right button, dragged"), tr("turns the tool; with Ctrl about its own axis")},
       {tr("Shift"), tr("motions at a tenth")},
       {tr("Space"), tr("spindle on or off")},

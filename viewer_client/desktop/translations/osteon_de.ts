@@ -541,6 +541,14 @@
         <translation>Die Hand drückt</translation>
     </message>
     <message>
+        <source>Pen</source>
+        <translation>Stift</translation>
+    </message>
+    <message>
+        <source>its tip pushes, as hard as you press it</source>
+        <translation>seine Spitze drückt, so stark wie Sie sie aufdrücken</translation>
+    </message>
+    <message>
         <source>Wheel</source>
         <translation>Rad</translation>
     </message>
