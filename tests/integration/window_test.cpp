@@ -246,6 +246,43 @@ TEST_F(WindowTest, APenPushesAsHardAsItIsPressed) {
   EXPECT_FALSE(pen(QEvent::TabletPress, middle(), 0.5, Qt::LeftButton, Qt::LeftButton));
 }
 
+TEST_F(WindowTest, ASpaceMouseTurnsTheToolAndMovesTheBone) {
+  open();
+  click_tool("drill");
+  hover(middle());
+  ASSERT_TRUE(until([&] { return view_->pointer().on_bone(); }));
+  const auto axis = [&] { return Vec3(view_->pointer().input().rotation_bone_tool * Vec3::UnitZ()); };
+  const CameraView before = view_->camera();
+  const Vec3 straight = axis();
+  // All the way to the right about the picture's vertical, for 0.2 s at 1 rad/s. The picture looks nearly along the
+  // tool, which is then tilted by as much.
+  SpaceMouseState cap;
+  cap.twist = Vec3::UnitY();
+  for (int i = 0; i < 20; ++i) view_->follow_cap(cap, 0.01);
+  EXPECT_NEAR(std::acos(axis().dot(straight)), 0.2, 0.01);
+  EXPECT_EQ(view_->camera().eye_mm, before.eye_mm);
+  cap.twist *= -1.0;
+  for (int i = 0; i < 20; ++i) view_->follow_cap(cap, 0.01);
+  // Each step parts the twist by the tool's axis at its beginning, an error of the order of a step.
+  EXPECT_NEAR((axis() - straight).norm(), 0.0, 1e-3);
+  // Within its rest the cap does nothing.
+  const Vec3 rested = axis();
+  cap.twist = 0.04 * Vec3::UnitX();
+  view_->follow_cap(cap, 0.1);
+  EXPECT_EQ(axis(), rested);
+  // A push moves the bone. Without a tool a twist does too.
+  cap = {};
+  cap.push = Vec3::UnitX();
+  view_->follow_cap(cap, 0.1);
+  const CameraView pushed = view_->camera();
+  EXPECT_GT((pushed.eye_mm - before.eye_mm).norm(), 0.5);
+  trigger("put_down");
+  cap = {};
+  cap.twist = Vec3::UnitY();
+  view_->follow_cap(cap, 0.1);
+  EXPECT_GT((view_->camera().eye_mm - pushed.eye_mm).norm(), 0.5);
+}
+
 TEST_F(WindowTest, AnotherSizeOfTheToolComesIntoTheHand) {
   open();
   click_tool("drill");

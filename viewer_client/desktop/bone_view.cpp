@@ -130,6 +130,16 @@ void BoneView::look_tool() {
 
 void BoneView::set_following(bool on) { follows_ = following_ = on; }
 
+void BoneView::follow_cap(const SpaceMouseState& cap, double dt_s) {
+  constexpr double kRest = 0.05, kFastest_rad_per_s = 1.0;
+  const Vec3 push = beyond_rest(cap.push, kRest), twist = beyond_rest(cap.twist, kRest);
+  if (push.isZero() && twist.isZero()) return;
+  if (!holding_) return look(held_by_cap(camera(), push, twist, dt_s));
+  pointer_.twist(camera(), kFastest_rad_per_s * dt_s * twist);
+  if (!push.isZero()) look(held_by_cap(camera(), push, Vec3::Zero(), dt_s));
+  pointer_moved();
+}
+
 void BoneView::follow_tool() {
   if (!following_ || !updater_ || updater_->states().empty()) return;
   const Pose& tool = updater_->states().front().pose_bone_tool;

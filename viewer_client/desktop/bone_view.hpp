@@ -12,6 +12,7 @@
 
 #include <QVTKOpenGLNativeWidget.h>
 
+#include "common/input/space_mouse_report.hpp"
 #include "viewer_client/render/bone_scene.hpp"
 #include "viewer_client/render/scene_updater.hpp"
 #include "viewer_client/scene/tool_pointer.hpp"
@@ -56,6 +57,9 @@ class BoneView : public QVTKOpenGLNativeWidget {
   // The camera goes after the first tool, until look() or the mouse moves it. look_tool() sends it after the tool
   // again.
   void set_following(bool on);
+  // The cap of a SpaceMouse was held so for dt_s. Its twist turns the tool in the hand, and its push moves the bone.
+  // Without a tool the bone follows both.
+  void follow_cap(const SpaceMouseState& cap, double dt_s);
   [[nodiscard]] bool following() const { return following_; }
   void set_notice(const QString& notice);
   // How the bone is drawn. It holds for the rooms that follow too.
