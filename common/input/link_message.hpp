@@ -14,7 +14,7 @@
 
 namespace osteon {
 
-inline constexpr int kLinkVersion = 1;
+inline constexpr int kLinkVersion = 2;
 // Bytes. Two texts of control characters, of six bytes each in JSON, a wave and all numbers fit into a message.
 inline constexpr std::size_t kMostLinkText = 512;
 

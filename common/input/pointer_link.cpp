@@ -40,10 +40,12 @@ std::string encode(const PointerOutput& output) {
               {"rotation", numbers(output.pose_bone_tool.rotation)},
               {"force_hand_n", numbers(output.force_hand_n)},
               {"force_bone_n", numbers(output.force_bone_n)},
+              {"device_holds_n", output.device_holds_n},
               {"push_n", output.push_n},
               {"depth_mm", output.depth_mm},
               {"pushing", output.pushing},
               {"on_metal", output.on_metal},
+              {"saturated", output.saturated},
               {"tool", shortened(output.tool)},
               {"trouble", shortened(output.trouble)}}
       .dump(-1, ' ', false, json::error_handler_t::replace);
@@ -74,10 +76,12 @@ Result<PointerOutput> read_pointer_output(std::string_view text) {
   output.pose_bone_tool.rotation = fields->rotation("rotation");
   output.force_hand_n = fields->vector("force_hand_n", kMostForce_n);
   output.force_bone_n = fields->vector("force_bone_n", kMostForce_n);
+  output.device_holds_n = fields->number("device_holds_n", 0.0, kMostForce_n);
   output.push_n = fields->number("push_n", 0.0, kMostForce_n);
   output.depth_mm = fields->number("depth_mm", -kFarthest_mm, kFarthest_mm);
   output.pushing = fields->yes("pushing");
   output.on_metal = fields->yes("on_metal");
+  output.saturated = fields->yes("saturated");
   output.tool = fields->text("tool");
   output.trouble = fields->text("trouble");
   if (const Result<void> read = fields->outcome(); !read) return tl::unexpected(read.error());

@@ -30,12 +30,14 @@ struct PointerInput {
 struct PointerOutput {
   Pose pose_bone_tool;
   Vec3 force_hand_n = Vec3::Zero(), force_bone_n = Vec3::Zero();  // what the hand gets, what the bone gives
-  double push_n = 0;                                              // with which the hand pushes now
-  double depth_mm = 0;                                            // of the tip along its axis since the push began
-  bool pushing = false;   // false while the button is held: the hand has reacted to a breakthrough
-  bool on_metal = false;  // metal is in the way of the turning tool
-  std::string tool{};     // in the hand
-  std::string trouble{};  // one sentence, such as why a tool cannot be held; empty: none
+  double device_holds_n = 0;  // the most that the device holds for long; 0: not known
+  double push_n = 0;          // with which the hand pushes now
+  double depth_mm = 0;        // of the tip along its axis since the push began
+  bool pushing = false;       // false while the button is held: the hand has reacted to a breakthrough
+  bool on_metal = false;      // metal is in the way of the turning tool
+  bool saturated = false;     // the device cannot hold what it should show
+  std::string tool{};         // in the hand
+  std::string trouble{};      // one sentence, such as why a tool cannot be held; empty: none
 };
 
 // As text, and back. A text of more than 512 bytes is shortened. Errors of reading, invalid_input: another version; a

@@ -32,6 +32,7 @@ struct Options {
   wire::CredentialArguments credentials;
   double patience_s = 5.0;
   std::optional<double> force_scale;
+  std::string force_choice;
   std::filesystem::path cut_log, summary;
   ToolOperatorOptions hand;
   ClientOptions client;
@@ -140,6 +141,9 @@ json summary_of(const ClientOutcome& outcome, const ReadyPlan& plan, std::string
         {"stiffness_n_per_mm", outcome.limits.stiffness_n_per_mm},
         {"workspace_radius_mm", outcome.limits.workspace_radius_mm}}},
       {"force_scale", outcome.loop.force_scale},
+      {"force_choice", name(outcome.loop.choice)},
+      {"force_knee_n", outcome.loop.compression.knee_n},
+      {"force_budget_n", outcome.loop.peak_n},
       {"coupling_n_per_mm", outcome.coupling_n_per_mm},
       {"workspace_scale", outcome.workspace_scale},
       {"loop",
@@ -250,6 +254,15 @@ Result<void> run(Options& options, const StopSignal& stop) {
   // Reports everything that can be wrong without a server before one is contacted.
   if (options.force_scale && !(*options.force_scale > 0.0 && *options.force_scale <= 1.0))
     return failure(ErrorCode::invalid_input, "--scale must be a number above 0 and at most 1");
+  if (!options.force_choice.empty()) {
+    const Result<ForceChoice> choice = find_force_choice(options.force_choice);
+    if (!choice) return failure(choice.error().code, "--force-choice: " + choice.error().message);
+    if (*choice != ForceChoice::proportional && options.force_scale)
+      return failure(ErrorCode::invalid_input,
+                     "--scale is for --force-choice proportional; leave out one of the two, the others scale by the "
+                     "device");
+    options.hand.force_choice = *choice;
+  }
   if (!(options.patience_s >= 0.0 && options.patience_s <= 3600.0))
     return failure(ErrorCode::invalid_input, "--timeout must be from 0 to 3600 seconds");
   const Result<wire::ClientCredentials> credentials = wire::client_credentials(options.credentials);
@@ -269,6 +282,7 @@ Result<void> run(Options& options, const StopSignal& stop) {
   log::info("in hand", {{"device", hand->device_name()},
                         {"peak_n", shown.peak_n},
                         {"continuous_n", shown.continuous_n},
+                        {"force_choice", name(shown.choice)},
                         {"force_scale", shown.force_scale}});
 
   options.client.played = hand->recorded();
@@ -352,6 +366,9 @@ int main(int argc, char** argv) {
   add_device_options(app, options.hand.devices);
   app.add_option("--scale", options.force_scale,
                  "Rendered over physical force; by default the device's continuous force / 30 N");
+  app.add_option("--force-choice", options.force_choice,
+                 "How a weak device shows strong forces: proportional (unless said otherwise), compressed (a logarithm "
+                 "up to its continuous force) or feed-cue (a small force, and a vibration that grows with the feed)");
   app.add_option("--session-log", options.client.session_log, "CSV with a row for each millisecond");
   app.add_option(
       "--record", options.client.record,

@@ -83,10 +83,12 @@ void PointerFeed::report() {
   client_->send({.pose_bone_tool = state.pose_bone_tool,
                  .force_hand_n = state.force_hand_n,
                  .force_bone_n = state.force_bone_n,
+                 .device_holds_n = state.device_holds_n,
                  .push_n = state.push_n,
                  .depth_mm = state.depth_mm,
                  .pushing = state.pushing,
                  .on_metal = state.on_metal,
+                 .saturated = state.saturated,
                  .tool = tools_[static_cast<std::size_t>(state.tool)],
                  .trouble = trouble_});
 }

@@ -295,7 +295,6 @@ tl::unexpected<Error> RecordFile::Impl::failed(const char* what) {
 
 void RecordFile::Impl::make_columns() {
   using R = TickRow;
-  const double s = info.loop.force_scale;
   // On a device without motors the loop's force is not shown.
   const bool forces = info.device_info.force_axes > 0, torques = info.device_info.torque_axes > 0;
   const auto add = [this](auto&& made) { columns.push_back(std::forward<decltype(made)>(made)); };
@@ -352,7 +351,8 @@ void RecordFile::Impl::make_columns() {
                        [](const R& r) { return r.depth_mm; }));
   add(column<float, R>("data/device_depth", "mm", "", "the same of the hand",
                        [](const R& r) { return r.device_depth_mm; }));
-  add(column<float, R>("data/force_scale", "1", "", "s: rendered over physical force", [s](const R&) { return s; }));
+  add(column<float, R>("data/force_scale", "1", "", "s: rendered over physical force",
+                       [loop = info.loop](const R& r) { return loop.scale_of(r.report.coupling.force_n.norm()); }));
   add(column<float, R>("data/guide_play", "mm", "",
                        "while in a guide: permitted distance of the tip from the opening's middle",
                        [](const R& r) { return r.report.contact.guide_play_mm; }));
@@ -439,6 +439,7 @@ bool RecordFile::Impl::make_metadata() {
   bool ok = set_text(g, recording::kDevice, info.device) && set_text(g, recording::kModel, info.device_info.model) &&
             set_text(g, recording::kCaseHash, info.case_hash) && set_text(g, recording::kCaseTitle, info.case_title) &&
             set_text(g, recording::kPlanDigest, info.plan_digest) &&
+            set_text(g, recording::kForceChoice, std::string(name(info.loop.choice))) &&
             set_integer(g, "author", static_cast<std::int64_t>(info.author));
   for (const auto& [name, value] : numbers_of_device) ok = ok && set_number(g, name, value);
   std::vector<std::string> tools;

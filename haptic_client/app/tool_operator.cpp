@@ -118,7 +118,8 @@ Result<ReadyPlan> ToolOperator::ready_on(const Case& bone, const ToolFinder& fin
   return ready;
 }
 
-Result<std::unique_ptr<Session>> ToolOperator::pointed_on(const Case& bone, const ToolBox& tools, double force_scale) {
+Result<std::unique_ptr<Session>> ToolOperator::pointed_on(const Case& bone, const ToolBox& tools,
+                                                          const ForceScaling& scaling) {
   std::vector<Tool> known;
   for (const ToolBox::Entry* entry : tools.entries()) known.push_back(entry->tool);
   Result<ReadyPlan> ready = make_pointed_hand(free_, bone, known);
@@ -126,11 +127,12 @@ Result<std::unique_ptr<Session>> ToolOperator::pointed_on(const Case& bone, cons
   std::vector<std::string> names;
   for (const ToolModel& model : ready->tools) names.push_back(model.tool.name);
   pointer_->set_tools(std::move(names));
-  return std::make_unique<PointerSession>(std::move(*ready), pointer_->exchange(), simulated_, force_scale);
+  return std::make_unique<PointerSession>(std::move(*ready), pointer_->exchange(), simulated_, scaling);
 }
 
 Result<std::unique_ptr<Session>> ToolOperator::on(const Case& bone, const ToolBox& tools, double force_scale) {
-  if (pointer_) return pointed_on(bone, tools, force_scale);
+  ForceScaling scaling(force_scale, options_.force_choice.value_or(ForceChoice::proportional));
+  if (pointer_) return pointed_on(bone, tools, scaling);
   Result<ReadyPlan> ready = ready_on(bone, [&](std::string_view name) { return tools.find(name); });
   if (!ready) return tl::unexpected(ready.error());
   if (recorded_) {
@@ -144,13 +146,21 @@ Result<std::unique_ptr<Session>> ToolOperator::on(const Case& bone, const ToolBo
       log::warn("the recording does not say what bone it began on",
                 {{"remedy", "make sure that the room's bone is in the same state as then"}});
     // The recorded hand reacted to a certain force; another force would not match it.
-    if (force_scale == 0.0) force_scale = recorded_->session().force_scale;
+    const RecordedSession& played = recorded_->session();
+    const Result<ForceChoice> choice =
+        find_force_choice(played.force_choice.empty() ? name(ForceChoice::proportional) : played.force_choice);
+    if (!choice) return failure(choice.error().code, "--device " + options_.device + ": " + choice.error().message);
+    if (options_.force_choice && *options_.force_choice != *choice)
+      return failure(ErrorCode::invalid_input, "--device " + options_.device + " was recorded with --force-choice " +
+                                                   std::string(name(*choice)) + "; leave out --force-choice");
+    scaling.choice = *choice;
+    if (*choice == ForceChoice::proportional && scaling.scale == 0.0) scaling.scale = played.force_scale;
   }
   if (options_.plan.empty()) {
     HapticDevice& device = person_ ? static_cast<HapticDevice&>(*person_) : *recorded_;
-    return std::make_unique<FreeHandSession>(std::move(*ready), device, force_scale);
+    return std::make_unique<FreeHandSession>(std::move(*ready), device, scaling);
   }
-  auto session = std::make_unique<SimulatedSession>(std::move(*ready), simulated_, force_scale);
+  auto session = std::make_unique<SimulatedSession>(std::move(*ready), simulated_, scaling);
   if (recorded_) session->play(*recorded_);
   return session;
 }

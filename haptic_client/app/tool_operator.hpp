@@ -25,6 +25,7 @@ struct ToolOperatorOptions {
   std::optional<std::string> law;
   std::optional<double> wear;
   DeviceOptions devices;
+  std::optional<ForceChoice> force_choice;  // default: proportional, or as it was recorded
 };
 
 class ToolOperator {
@@ -53,7 +54,7 @@ class ToolOperator {
   // The plan's steps, or those of the person's hand.
   Result<ReadyPlan> ready_on(const Case& bone, const ToolFinder& find) const;
   // The session of a person with a pointer.
-  Result<std::unique_ptr<Session>> pointed_on(const Case& bone, const ToolBox& tools, double force_scale);
+  Result<std::unique_ptr<Session>> pointed_on(const Case& bone, const ToolBox& tools, const ForceScaling& scaling);
   // Opens a person's devices.
   Result<void> connect(const DeviceNotice& notice);
 

@@ -266,6 +266,7 @@ Result<RecordedSession> read_recording(const std::filesystem::path& file) {
   if (reader.has(recording::kPlanDigest, g)) session.plan_digest = reader.text(g, recording::kPlanDigest);
   session.tools = reader.texts(recording::kTools);
   session.force_scale = reader.number(g, recording::kForceScale);
+  if (reader.has(recording::kForceChoice, g)) session.force_choice = reader.text(g, recording::kForceChoice);
   session.limits = limits_of(reader);
   session.info.model = "a recording of " + (session.device_model.empty() ? session.device : session.device_model);
   session.info.force_axes = static_cast<int>(reader.number(g, recording::kForceAxes));

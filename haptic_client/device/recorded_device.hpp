@@ -20,6 +20,7 @@ struct RecordedSession {
   std::string start_hash;             // of the bone at the beginning; empty: the recording does not say
   std::string field_hash;             // of the bone at the end; empty: the recording has no end
   double force_scale = 0;             // s
+  std::string force_choice;           // as --force-choice names it; empty: proportional
   DeviceLimits limits;
   DeviceInfo info;
   std::vector<DeviceReading> readings;  // one for each tick from the first row on; a lost row repeats the one before

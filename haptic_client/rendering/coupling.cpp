@@ -61,7 +61,9 @@ CouplingForce Coupling::step(const CouplingMoment& moment, const ProxyStep& prox
                              double smooth_s) noexcept {
   CouplingForce force;
   const double k = moment.stiffness_n_per_mm;
+  const Compression& compression = moment.compression;
   const auto stored_mj = [&](double extension_mm) {
+    if (compression.on()) return moment.energy_scale * compression.stored_mj(k, extension_mm);
     return 0.5 * k * moment.energy_scale * extension_mm * extension_mm;
   };
   // Energy of the rotation's spring. What the device cannot show is not stored either.
@@ -70,7 +72,9 @@ CouplingForce Coupling::step(const CouplingMoment& moment, const ProxyStep& prox
     const double shown_rad = k_turn > 0.0 ? std::min(size_rad, moment.limit_nmm / k_turn) : 0.0;
     return moment.energy_scale * k_turn * shown_rad * (size_rad - 0.5 * shown_rad);
   };
-  const double cutting_mj = moment.energy_scale * proxy.cutting_work_mj;
+  // What the hand feels of the cutting force is what it pays for.
+  const double cutting_mj =
+      moment.energy_scale * proxy.cutting_work_mj * compression.share(proxy.cutting_force_n.norm());
   Vec3 e_mm = moment.handle_mm + offset_mm() - moment.proxy_mm;
 
   if (!moment.touching) {
@@ -107,7 +111,10 @@ CouplingForce Coupling::step(const CouplingMoment& moment, const ProxyStep& prox
   }
   // Where less force was shown than the spring's (missed ticks, the ramp, the monitor), the hand moves on without
   // paying. That extension would permanently show less force than the spring says, and cut less. So it is released.
-  const double size_mm = e_mm.norm(), paid_mm = ledger.paid_mm(k * moment.energy_scale, cutting_mj);
+  const double size_mm = e_mm.norm();
+  const double paid_mm = compression.on()
+                             ? compression.paid_mm(k, size_mm, ledger.paid_mj(cutting_mj) / moment.energy_scale)
+                             : ledger.paid_mm(k * moment.energy_scale, cutting_mj);
   if (moment.fell_short && size_mm > paid_mm) let_go(slack_mm_, e_mm, e_mm * (paid_mm / size_mm));
   ledger.settle(cutting_mj, stored_mj(e_mm.norm()) + now_turned_mj, now_turned_mj);
 

@@ -12,6 +12,7 @@
 #include "common/mechanics/force_filter.hpp"
 #include "haptic_client/contact/proxy.hpp"
 #include "haptic_client/rendering/energy_ledger.hpp"
+#include "haptic_client/rendering/force_scaling.hpp"
 
 namespace osteon::haptic {
 
@@ -20,6 +21,7 @@ struct CouplingMoment {
   double stiffness_n_per_mm = 0;              // K_c, physical
   double limit_n = 0;                         // physical: the device's limit divided by s
   double energy_scale = 1;  // mJ at the handle for each physical mJ: s divided by the workspace's scale
+  Compression compression;  // of the force; without a spring of the rotation
   bool touching = false;
   // In the last tick less force than the spring's was shown, and the slew limit was not the reason.
   bool fell_short = false;

@@ -64,6 +64,10 @@ double EnergyLedger::paid_mm(double stiffness_n_per_mm, double cutting_mj) const
   return std::sqrt(2.0 * std::max(0.0, paid_mj) / stiffness_n_per_mm);
 }
 
+double EnergyLedger::paid_mj(double cutting_mj) const noexcept {
+  return std::max(0.0, account_mj_ - turned_mj_ - cutting_mj + params_.allowance_mj);
+}
+
 double EnergyLedger::draw(double wanted_mj) noexcept {
   const double drawn_mj = std::clamp(wanted_mj, 0.0, report_.tank_mj);
   report_.tank_mj -= drawn_mj;

@@ -62,6 +62,9 @@ class EnergyLedger {
   // Extension of a spring of that stiffness that the hand would have paid for, after this much more energy went into
   // cutting.
   [[nodiscard]] double paid_mm(double stiffness_n_per_mm, double cutting_mj) const noexcept;
+  // Energy that the hand has put in, beside what is in the spring of the rotation, after this much more went into
+  // cutting.
+  [[nodiscard]] double paid_mj(double cutting_mj = 0.0) const noexcept;
   // What the proxy then did: the law's force times the path cut, and the springs' energy now. `turned_mj`: the part of
   // it in the spring of the rotation, which cuts nothing.
   void settle(double cutting_mj, double stored_mj, double turned_mj = 0.0) noexcept;

@@ -14,7 +14,7 @@ Load load_on_bone(const HapticLoop& loop, const LoopReport& report, const Pose& 
                   const Vec3& centre_now_mm) noexcept {
   const double s = loop.params().force_scale;
   const WorkspaceMapping& mapping = loop.mapping();
-  const Vec3 force_n = mapping.to_bone(report.coupling.device_n) / -s;
+  const Vec3 force_n = -loop.params().compression.inverse(Vec3(mapping.to_bone(report.coupling.device_n) / s));
   Load load = Load::at(force_n, pose_rest_bone.point(report.pose_bone_proxy.position_mm) - centre_now_mm);
   load.moment_nmm += mapping.to_bone(report.coupling.device_nmm) * (mapping.scale() / -s);
   return load;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numbers>
 
 #include "common/mechanics/drilling.hpp"
 #include "haptic_client/device/haptic_device.hpp"
@@ -10,8 +11,17 @@
 
 namespace osteon::haptic {
 
-LoopParams loop_params(const DeviceLimits& limits, double force_scale) {
+namespace {
+
+// The skin is most sensitive to vibration from 150 to 300 Hz; a loop of 1 kHz draws the lower end well [A].
+constexpr double kCue_hz = 150.0;
+constexpr double kHalfCue_mm_per_s = 1.0;  // feed that shakes half as hard as the fastest [A]
+
+}  // namespace
+
+LoopParams loop_params(const DeviceLimits& limits, const ForceScaling& scaling) {
   constexpr double kFullScale_n = 30.0;
+  const double force_scale = scaling.scale;
   LoopParams params;
   params.peak_n = limits.peak_n;
   params.continuous_n = limits.continuous_n;
@@ -19,6 +29,15 @@ LoopParams loop_params(const DeviceLimits& limits, double force_scale) {
   params.device_n_per_mm = limits.stiffness_n_per_mm;
   params.peak_nmm = limits.peak_nmm;
   params.continuous_nmm = limits.continuous_nmm;
+  params.choice = scaling.choice;
+  if (scaling.choice == ForceChoice::proportional) return params;
+  const bool cue = scaling.choice == ForceChoice::feed_cue;
+  const double budget_n = (cue ? kCueShare : 1.0) * limits.continuous_n;
+  params.compression = Compression::within(budget_n);
+  params.force_scale = std::min(1.0, budget_n / params.compression.of(kFullForce_n));
+  params.peak_n = params.continuous_n = budget_n;
+  params.peak_nmm = params.continuous_nmm = 0.0;
+  if (cue) params.cue_n = limits.continuous_n - budget_n;
   return params;
 }
 
@@ -123,11 +142,12 @@ LoopReport HapticLoop::tick(const LoopInput& input, const Patch& patch, std::spa
 
   // Limit of the force that is felt and cut with, as physical force.
   const double s = params_.force_scale;
-  const double device_n = (input.device_warm ? params_.continuous_n : params_.peak_n) / s;
+  const Compression& compression = params_.compression;
+  const double device_n = compression.inverse((input.device_warm ? params_.continuous_n : params_.peak_n) / s);
   // A decreasing limit starts from all that is felt. Starting from the contact's force alone would at once leave
   // nothing to the guidance spring.
   const double felt_n = shown_.force_n.norm() + guide_pull_.force_n().norm() + partner_n_.norm();
-  const double limit_n = guard_.limit_n(device_n, felt_n / s, slow_n(input) / s);
+  const double limit_n = guard_.limit_n(device_n, compression.inverse(felt_n / s), slow_n(input) / s);
 
   const Pose proxy_before = proxy_.pose();
   double paid_n_per_mm = coupling_n_per_mm_;
@@ -140,7 +160,9 @@ LoopReport HapticLoop::tick(const LoopInput& input, const Patch& patch, std::spa
     // Cutting spends no more than the hand has put in.
     const double at_handle = s / mapping_.scale();
     const double stretch_mm = (pose_bone_wanted.position_mm - proxy_before.position_mm).norm();
-    paid_n_per_mm = ledger_.paid_n_per_mm(at_handle * coupling_n_per_mm_, stretch_mm) / at_handle;
+    paid_n_per_mm = compression.on()
+                        ? compression.paid_n_per_mm(coupling_n_per_mm_, stretch_mm, ledger_.paid_mj() / at_handle)
+                        : ledger_.paid_n_per_mm(at_handle * coupling_n_per_mm_, stretch_mm) / at_handle;
     if (limit_n < device_n) paid_n_per_mm = std::min(paid_n_per_mm, limit_n / stretch_mm);
     step = proxy_.step(model, patch, pose_bone_wanted, spindle_.rpm, paid_n_per_mm,
                        works && input.may_cut && !input.clutch && !cuts_waiting, params_.dt_s,
@@ -185,6 +207,7 @@ LoopReport HapticLoop::tick(const LoopInput& input, const Patch& patch, std::spa
   moment.stiffness_n_per_mm = coupling_n_per_mm_;
   moment.limit_n = limit_n;
   moment.energy_scale = s / mapping_.scale();
+  moment.compression = compression;
   moment.fell_short = fell_short_;
   moment.touching = (step.contact || step.breakthrough || held_back) && step.covered && !input.clutch;
   // Torque is scaled to the handle as the work of a force is, so that one store holds both. Where the workspace is
@@ -245,7 +268,8 @@ double HapticLoop::load_nmm(const ProxyStep& step, double pressed_n) noexcept {
 
 void HapticLoop::show(const LoopInput& input, const ToolModel& model, const CouplingForce& coupling,
                       const CouplingMoment& moment, const Vec3& cut_nmm, LoopReport& report) noexcept {
-  const double s = params_.force_scale, limit_n = s * moment.limit_n,
+  const Compression& compression = params_.compression;
+  const double s = params_.force_scale, limit_n = s * compression.of(moment.limit_n),
                limit_nmm = moment.energy_scale * moment.limit_nmm;
   const bool safe = input.device_ok && input.periods <= 3;
   const double ramp = params_.dt_s / params_.ramp_s;
@@ -265,7 +289,7 @@ void HapticLoop::show(const LoopInput& input, const ToolModel& model, const Coup
   const Vec3 turn_nmm = moment.energy_scale * (coupling.turn_spring_nmm + coupling.turn_damping_nmm);
   Wrench wanted;
   if (moment.touching && safe) {
-    wanted.force_n = s * (coupling.spring_n + coupling.damping_n + coupling.cutting_lag_n);
+    wanted.force_n = s * compression.of(Vec3(coupling.spring_n + coupling.damping_n + coupling.cutting_lag_n));
     wanted.force_n = slewed(ramp_ * clamped(wanted.force_n, limit_n), shown_.force_n, by_hand_n + slow, report);
     wanted.torque_nmm = slewed(ramp_ * clamped(turn_nmm, limit_nmm), shown_.torque_nmm,
                                turn_arm_mm_ * (by_hand_n / mapping_.scale() + slow), report);
@@ -273,9 +297,12 @@ void HapticLoop::show(const LoopInput& input, const ToolModel& model, const Coup
   const auto share = [](const Vec3& shown, double whole) {
     return whole > 0.0 ? std::min(1.0, shown.norm() / whole) : 0.0;
   };
-  const Wrench damping{
-      share(wanted.force_n, s * (coupling.spring_n + coupling.damping_n).norm()) * s * coupling.damping_n,
-      share(wanted.torque_nmm, turn_nmm.norm()) * moment.energy_scale * coupling.turn_damping_nmm};
+  // The part of the compressed force that damping causes.
+  const Vec3 spring_and_damping_n = compression.of(Vec3(coupling.spring_n + coupling.damping_n));
+  const Vec3 damping_n =
+      compression.on() ? Vec3(spring_and_damping_n - compression.of(coupling.spring_n)) : coupling.damping_n;
+  const Wrench damping{share(wanted.force_n, s * spring_and_damping_n.norm()) * s * damping_n,
+                       share(wanted.torque_nmm, turn_nmm.norm()) * moment.energy_scale * coupling.turn_damping_nmm};
   shown_ = ledger_.limited(wanted, damping, moment.touching);
   report.coupling.energy = ledger_.report();
   // Begins with a missed tick, the ramp or the monitor, and lasts until the shown force has come up again. It does not
@@ -283,7 +310,7 @@ void HapticLoop::show(const LoopInput& input, const ToolModel& model, const Coup
   // sink.
   constexpr double kClearly = 0.9;  // the filter's lag is less
   fell_short_ = moment.touching && (fell_short_ || !safe || ramp_ < 1.0 || report.coupling.energy.held_back) &&
-                shown_.force_n.norm() < kClearly * s * coupling.spring_n.norm();
+                shown_.force_n.norm() < kClearly * s * compression.of(coupling.spring_n.norm());
   if (report.coupling.energy.held_back) report.events |= kEnergyLimited;
   report.coupling.device_n = to_device(shown_.force_n);
   report.coupling.device_nmm = to_device(shown_.torque_nmm);
@@ -293,13 +320,14 @@ void HapticLoop::show(const LoopInput& input, const ToolModel& model, const Coup
   motor.pedal = input.spindle_rpm > 0.0 && input.room == RoomLink::follows && !(report.events & kForbidden) && safe;
   motor.spindle_rpm = spindle_.rpm;
   motor.teeth = model.tool.teeth;
-  motor.normal_n = shown_.force_n / s;
+  const double motor_scale = params_.scale_of(coupling.spring_n.norm());
+  motor.normal_n = shown_.force_n / motor_scale;
   motor.axis = report.pose_bone_proxy.direction(Vec3::UnitZ());
   motor.cutting = report.cutting.phase == CuttingPhase::cutting;
   motor.across_n = report.cutting.across_n;
   motor.stroke = report.pose_bone_proxy.direction(model.stroke);
   if (params_.tool_effects) motor.pull_n = effects_[static_cast<std::size_t>(tool_)].pull_n();
-  Vec3 motor_n = s * motor_.step(motor, params_.dt_s);
+  Vec3 motor_n = motor_scale * motor_.step(motor, params_.dt_s);
   if (!params_.motor_effects || !safe) motor_n.setZero();
   motor_n = clamped(motor_n, std::max(0.0, limit_n - shown_.force_n.norm()));
   report.motor.device_n = to_device(motor_n);
@@ -308,7 +336,8 @@ void HapticLoop::show(const LoopInput& input, const ToolModel& model, const Coup
   const double room_n = std::max(0.0, limit_n - shown_.force_n.norm() - motor_n.norm());
   lead(input, meet(input, {room_n, std::clamp(slow - grown_n, 0.0, slow), by_hand_n + slow}, report), report);
   together_n_ = report.coupling.device_n + report.guidance.device_n + report.partners.device_n;
-  report.device.force_n = together_n_ + report.motor.device_n;
+  report.cue.device_n = cue_n(report, safe);
+  report.device.force_n = together_n_ + report.motor.device_n + report.cue.device_n;
 
   // The same for the moment of the cut, never a force. It is at most what the shown force would be at the arm of a
   // rotation. It grows no faster than force grows that the hand did not cause.
@@ -319,6 +348,15 @@ void HapticLoop::show(const LoopInput& input, const ToolModel& model, const Coup
   motor_nmm_ = clamped(clamped(motor_nmm, motor_nmm_.norm() + turn_arm_mm_ * slow), most_nmm);
   report.motor.device_nmm = to_device(motor_nmm_);
   report.device.torque_nmm = report.coupling.device_nmm + report.motor.device_nmm;
+}
+
+Vec3 HapticLoop::cue_n(const LoopReport& report, bool safe) noexcept {
+  if (!(params_.cue_n > 0.0) || !safe || report.cutting.phase != CuttingPhase::cutting) return Vec3::Zero();
+  cue_phase_ = std::fmod(cue_phase_ + kCue_hz * params_.dt_s, 1.0);
+  const double feed = std::max(0.0, report.cutting.feed_mm_per_s);
+  const double amplitude_n = ramp_ * motor_.open() * params_.cue_n * feed / (feed + kHalfCue_mm_per_s);
+  const double now_n = amplitude_n * std::sin(2.0 * std::numbers::pi * cue_phase_);
+  return to_device(now_n * report.pose_bone_proxy.direction(Vec3::UnitZ()));
 }
 
 void HapticLoop::feel_partners() {
@@ -344,7 +382,7 @@ HapticLoop::Left HapticLoop::meet(const LoopInput& input, const Left& left, Loop
   const PartnerForce felt = partner_contact_.step(touch_points_[static_cast<std::size_t>(tool_)],
                                                   report.pose_bone_proxy, std::span(others).first(count), params_.dt_s);
   if (felt.author != 0) report.events |= kPartnerTouched;
-  Vec3 wanted_n = to_device(clamped(params_.force_scale * felt.force_n, left.room_n));
+  Vec3 wanted_n = to_device(clamped(params_.force_scale * params_.compression.of(felt.force_n), left.room_n));
   const Vec3 grown_n = growth(wanted_n, partner_n_);
   wanted_n += clamped(grown_n, left.slew_n) - grown_n;
   report.partners.device_n = partner_n_ = wanted_n;

@@ -17,6 +17,7 @@
 #include "haptic_client/contact/proxy.hpp"
 #include "haptic_client/prediction/cut_recorder.hpp"
 #include "haptic_client/rendering/coupling.hpp"
+#include "haptic_client/rendering/force_scaling.hpp"
 #include "haptic_client/rendering/guidance_spring.hpp"
 #include "haptic_client/rendering/motor_port.hpp"
 #include "haptic_client/rendering/supervision_guard.hpp"
@@ -28,7 +29,10 @@ struct DeviceLimits;
 
 struct LoopParams {
   double dt_s = 1e-3;
-  double force_scale = 1.0;          // s: rendered = s · physical
+  double force_scale = 1.0;  // s: rendered = s · physical; with a compression, of small forces
+  ForceChoice choice = ForceChoice::proportional;
+  Compression compression;           // of the force, before s
+  double cue_n = 0.0;                // of the feed cue: largest amplitude of its vibration, on the device
   double stiffness_n_per_mm = 50.0;  // K_c of the coupling, physical, if the device is stiff enough for it
   double device_n_per_mm = 60.0;     // k of the device
   double peak_n = 60.0;              // of the device
@@ -41,10 +45,14 @@ struct LoopParams {
   double ramp_s = 0.3;
   bool motor_effects = true;
   bool tool_effects = true;  // bluntness, clogging, grab, binding, blows
+
+  // Rendered over physical, of a physical force of this size.
+  [[nodiscard]] double scale_of(double force_n) const noexcept { return force_scale * compression.share(force_n); }
 };
 
-// For a device: s = continuous force / 30 N unless given.
-[[nodiscard]] LoopParams loop_params(const DeviceLimits& limits, double force_scale);
+// For a device: s = continuous force / 30 N unless given. The compressed choice shows at most the continuous force, and
+// the feed cue both parts within it. Neither shows torque: force and torque would not be one store of energy.
+[[nodiscard]] LoopParams loop_params(const DeviceLimits& limits, const ForceScaling& scaling);
 
 // How the room takes this client's cuts.
 enum class RoomLink : std::uint8_t {
@@ -132,6 +140,11 @@ struct LoopReport {
     Vec3 device_nmm = Vec3::Zero();  // moment of the cut, within the coupling's force at the arm of a rotation
   } motor;
 
+  // The feed cue's vibration: active, outside the energy ledger, with zero mean.
+  struct Cue {
+    Vec3 device_n = Vec3::Zero();
+  } cue;
+
   // Others' tools that touch this one.
   struct Partners {
     Vec3 device_n = Vec3::Zero();
@@ -210,6 +223,8 @@ class HapticLoop {
   void lead(const LoopInput& input, const Left& left, LoopReport& report) noexcept;
   // Adds the force of others' tools. Returns what it leaves.
   Left meet(const LoopInput& input, const Left& left, LoopReport& report) noexcept;
+  // The vibration of the feed cue, device frame.
+  [[nodiscard]] Vec3 cue_n(const LoopReport& report, bool safe) noexcept;
   // Permitted growth of force on the device in this tick that the hand did not cause.
   [[nodiscard]] double slow_n(const LoopInput& input) const noexcept;
   // A force or torque that rises by no more than `most`. `now`: what is shown.
@@ -251,6 +266,7 @@ class HapticLoop {
   Pose bone_, bone_before_;         // relative to its rest pose, now and in the last tick
   bool moved_ = false;              // the bone is not at rest
   bool device_was_ok_ = true;
+  double cue_phase_ = 0;  // of the feed cue's vibration, in turns
   // In the last tick less than the coupling's spring was shown, and the slew limit was not the reason.
   bool fell_short_ = false;
   double ramp_ = 0;  // 0 … 1

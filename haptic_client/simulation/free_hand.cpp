@@ -112,11 +112,11 @@ Result<ReadyPlan> make_free_hand(const FreeHandOptions& options, const Case& bon
   return ready;
 }
 
-FreeHandSession::FreeHandSession(ReadyPlan plan, HapticDevice& device, double force_scale)
+FreeHandSession::FreeHandSession(ReadyPlan plan, HapticDevice& device, const ForceScaling& scaling)
     : plan_(std::move(plan)),
       device_(device),
       limits_(shown(device.limits())),
-      loop_(loop_params(limits_, force_scale), plan_.tools) {}
+      loop_(loop_params(limits_, scaling), plan_.tools) {}
 
 void FreeHandSession::take_up(const DeviceReading& reading, SurgeonOrder& order) noexcept {
   const ReadyStep& step = plan_.steps[0];

@@ -34,7 +34,7 @@ class FreeHandSession final : public Session {
  public:
   // `plan`: from make_free_hand(). `device`: open, outlives the session. A device without force is treated as one that
   // shows all force, but is sent none.
-  FreeHandSession(ReadyPlan plan, HapticDevice& device, double force_scale);
+  FreeHandSession(ReadyPlan plan, HapticDevice& device, const ForceScaling& scaling);
 
   SessionTick tick(const Patch& patch, RoomLink room, int periods = 1,
                    const std::vector<PlacedGuide>* room_guides = nullptr) noexcept override;

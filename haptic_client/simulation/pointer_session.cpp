@@ -23,8 +23,8 @@ constexpr double kFine = 0.1;
 constexpr double kReact_s = 0.6;  // as of the simulated surgeon
 constexpr double kStuck_s = 3.0;
 
-LoopParams pointer_params(const DeviceLimits& limits, double force_scale, double dt_s) {
-  LoopParams params = loop_params(limits, force_scale);
+LoopParams pointer_params(const DeviceLimits& limits, const ForceScaling& scaling, double dt_s) {
+  LoopParams params = loop_params(limits, scaling);
   params.dt_s = dt_s;
   return params;
 }
@@ -60,11 +60,11 @@ Result<ReadyPlan> make_pointed_hand(const FreeHandOptions& first, const Case& bo
 }
 
 PointerSession::PointerSession(ReadyPlan plan, PointerExchange& exchange, const SimulatedDeviceParams& device,
-                               double force_scale, double dt_s)
+                               const ForceScaling& scaling, double dt_s)
     : plan_(std::move(plan)),
       exchange_(exchange),
       device_(device),
-      loop_(pointer_params(device.limits, force_scale, dt_s), plan_.tools) {
+      loop_(pointer_params(device.limits, scaling, dt_s), plan_.tools) {
   near_.make_room(kMostContactPoints);
   // Until the pointer first meets the bone, the tool waits above it, as a free hand's does. Others see it there.
   const ReadyStep& step = plan_.steps[0];
@@ -104,7 +104,8 @@ void PointerSession::take_up(SurgeonOrder& order) noexcept {
   held_ = command_.tool;
   height_mm_ = kAway_mm;
   loop_.take_up(held_, pose, mapping);
-  const HandParams hand = scaled(expert_hand(), loop_.params().force_scale, mapping.scale());
+  const HandParams physical = expert_hand();
+  const HandParams hand = scaled(physical, loop_.params().scale_of(physical.push_n), mapping.scale());
   across_n_per_mm_ = hand.lateral_n_per_mm;
   device_.take(hand, mapping.pose_device_tool(pose).position_mm);
   hand_ = {HandMode::carry, tip_mm, axis()};
@@ -253,7 +254,7 @@ SessionTick PointerSession::tick(const Patch& patch, RoomLink room, int periods,
     const WorkspaceMapping& mapping = loop_.mapping();
     HandCommand command = hand_;
     command.target_mm = mapping.pose_device_tool({hand_.target_mm, rotation_}).position_mm;
-    device_.push_with(command_.push_n * loop_.params().force_scale);
+    device_.push_with(command_.push_n * loop_.params().scale_of(command_.push_n));
     // A hand that is stiffer across the axis than along it leaves the straight way, so a tilted tool would dip.
     const HandParams& hand = device_.hand().params();
     device_.hold_across(phase_ < PointerPhase::pushes ? hand.stiffness_n_per_mm : across_n_per_mm_);
@@ -295,6 +296,9 @@ SessionTick PointerSession::tick(const Patch& patch, RoomLink room, int periods,
   state.depth_mm =
       phase_ >= PointerPhase::pushes ? (state.pose_bone_tool.position_mm - pushed_from_mm_).dot(hand_.axis) : 0.0;
   state.on_metal = (last_.events & kOnMetal) != 0;
+  state.device_holds_n = device_.limits().continuous_n;
+  // It holds its peak for moments only.
+  state.saturated = (last_.events & kForceLimited) != 0 || last_.device.force_n.norm() > state.device_holds_n;
   state.tool = last_.tool;
   exchange_.states.publish();
   return result;

@@ -28,7 +28,8 @@ struct PointerState {
   Pose pose_bone_tool;
   Vec3 force_hand_n = Vec3::Zero(), force_bone_n = Vec3::Zero();
   double push_n = 0, depth_mm = 0;
-  bool pushing = false, on_metal = false;
+  double device_holds_n = 0;  // the most that the device holds for long
+  bool pushing = false, on_metal = false, saturated = false;
   int tool = 0;
 };
 
@@ -55,8 +56,8 @@ enum class PointerPhase : std::uint8_t {
 class PointerSession final : public Session {
  public:
   // `plan`: from make_pointed_hand(). `exchange` outlives the session.
-  PointerSession(ReadyPlan plan, PointerExchange& exchange, const SimulatedDeviceParams& device, double force_scale,
-                 double dt_s = 1e-3);
+  PointerSession(ReadyPlan plan, PointerExchange& exchange, const SimulatedDeviceParams& device,
+                 const ForceScaling& scaling, double dt_s = 1e-3);
 
   // [haptic] Time is counted in these ticks.
   SessionTick tick(const Patch& patch, RoomLink room, int periods = 1,

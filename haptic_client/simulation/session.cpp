@@ -3,17 +3,18 @@
 namespace osteon::haptic {
 
 namespace {
-LoopParams params_of(const DeviceLimits& limits, double force_scale, double dt_s) {
-  LoopParams params = loop_params(limits, force_scale);
+LoopParams params_of(const DeviceLimits& limits, const ForceScaling& scaling, double dt_s) {
+  LoopParams params = loop_params(limits, scaling);
   params.dt_s = dt_s;
   return params;
 }
 }  // namespace
 
-SimulatedSession::SimulatedSession(ReadyPlan plan, const SimulatedDeviceParams& device, double force_scale, double dt_s)
+SimulatedSession::SimulatedSession(ReadyPlan plan, const SimulatedDeviceParams& device, const ForceScaling& scaling,
+                                   double dt_s)
     : surgeon_(std::move(plan)),
       device_(device),
-      loop_(params_of(device.limits, force_scale, dt_s), surgeon_.plan().tools) {}
+      loop_(params_of(device.limits, scaling, dt_s), surgeon_.plan().tools) {}
 
 bool SimulatedSession::done() const noexcept {
   if (surgeon_.done() || !played_ || !played_->over()) return surgeon_.done();
@@ -38,8 +39,10 @@ SessionTick SimulatedSession::tick(const Patch& patch, RoomLink room, int period
       const WorkspaceMapping mapping = Surgeon::mapping_for(step, limits.workspace_radius_mm, stiff_enough);
       const Pose pose_bone_tool{result.order.hand.target_mm, step.rotation};
       loop_.take_up(step.tool, pose_bone_tool, mapping);
-      // On a device that shows less than the physical force, the whole hand is scaled down by the same factor.
-      const HandParams hand = scaled(Surgeon::hand_for(step.plan), params.force_scale, mapping.scale());
+      // On a device that shows less than the physical force, the whole hand is scaled down by the same factor: that of
+      // its push.
+      const HandParams physical = Surgeon::hand_for(step.plan);
+      const HandParams hand = scaled(physical, params.scale_of(physical.push_n), mapping.scale());
       device_.take(hand, mapping.pose_device_tool(pose_bone_tool).position_mm);
     }
     const WorkspaceMapping& mapping = loop_.mapping();

@@ -35,7 +35,8 @@ class Session {
 class SimulatedSession final : public Session {
  public:
   // `dt_s`: of a tick.
-  SimulatedSession(ReadyPlan plan, const SimulatedDeviceParams& device, double force_scale, double dt_s = 1e-3);
+  SimulatedSession(ReadyPlan plan, const SimulatedDeviceParams& device, const ForceScaling& scaling,
+                   double dt_s = 1e-3);
 
   // [haptic] The simulated hand's time is counted in these ticks. While no tick comes, for example when the machine
   // stalls, no time passes for it.

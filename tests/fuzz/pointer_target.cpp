@@ -36,6 +36,7 @@ void check_output(const PointerOutput& output) {
   OSTEON_CHECK(again->pose_bone_tool.position_mm == output.pose_bone_tool.position_mm);
   OSTEON_CHECK(again->depth_mm == output.depth_mm && again->push_n == output.push_n);
   OSTEON_CHECK(again->pushing == output.pushing && again->on_metal == output.on_metal);
+  OSTEON_CHECK(again->device_holds_n == output.device_holds_n && again->saturated == output.saturated);
 }
 
 void check_report(const SoundReport& report) {

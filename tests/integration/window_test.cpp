@@ -20,6 +20,7 @@
 #include <QSpinBox>
 #include <QStackedWidget>
 #include <QStatusBar>
+#include <QTabletEvent>
 #include <QTest>
 #include <QToolButton>
 #include <QUrl>
@@ -213,6 +214,83 @@ TEST_F(WindowTest, WheelSpaceAndShiftSetPushSpindleAndFineMotion) {
   EXPECT_TRUE(view_->pointer().input().fine);
   QTest::keyRelease(view_, Qt::Key_Shift);
   EXPECT_FALSE(view_->pointer().input().fine);
+}
+
+TEST_F(WindowTest, APenPushesAsHardAsItIsPressed) {
+  open();
+  click_tool("drill");
+  hover(middle());
+  ASSERT_TRUE(until([&] { return view_->pointer().on_bone(); }));
+  view_->pointer().set_push(12.0);
+  const auto pen = [&](QEvent::Type type, const QPoint& at, double pressure, Qt::MouseButton button,
+                       Qt::MouseButtons buttons) {
+    QTabletEvent event(type, at, view_->mapToGlobal(at), QTabletEvent::Stylus, QTabletEvent::Pen, pressure, 0, 0, 0.0,
+                       0.0, 0, Qt::NoModifier, 1, button, buttons);
+    QApplication::sendEvent(view_, &event);
+    return event.isAccepted();
+  };
+  // In the air over the tablet it points and does not push.
+  EXPECT_TRUE(pen(QEvent::TabletMove, middle() + QPoint(20, 0), 0.0, Qt::NoButton, Qt::NoButton));
+  EXPECT_FALSE(view_->pointer().pushing());
+  EXPECT_EQ(view_->pointer().push_n(), 12.0);
+  // From 1 to 40 N, in proportion to the pressure: 1 + 39 p.
+  EXPECT_TRUE(pen(QEvent::TabletPress, middle(), 0.0, Qt::LeftButton, Qt::LeftButton));
+  EXPECT_TRUE(view_->pointer().pushing());
+  EXPECT_DOUBLE_EQ(view_->pointer().push_n(), 1.0);
+  for (const double pressure : {0.5, 1.0, 0.25}) {
+    EXPECT_TRUE(pen(QEvent::TabletMove, middle(), pressure, Qt::NoButton, Qt::LeftButton));
+    EXPECT_DOUBLE_EQ(view_->pointer().push_n(), 1.0 + 39.0 * pressure);
+    EXPECT_DOUBLE_EQ(view_->pointer().input().push_n, view_->pointer().push_n());
+  }
+  EXPECT_TRUE(until([&] { return cut(); })) << problem();
+  // Lifted, it leaves the push that the wheel has set.
+  EXPECT_TRUE(pen(QEvent::TabletRelease, middle(), 0.0, Qt::LeftButton, Qt::NoButton));
+  EXPECT_FALSE(view_->pointer().pushing());
+  EXPECT_EQ(view_->pointer().push_n(), 12.0);
+  // The window shows what bone and hand give, and what the device holds: the simulated hand 30 N.
+  EXPECT_TRUE(until([&] { return label("budget_words").endsWith("the device holds 30.0 N."); }))
+      << label("budget_words").toStdString();
+  // Its barrel button, and a pen without a tool, are the mouse's.
+  EXPECT_FALSE(pen(QEvent::TabletPress, middle(), 0.0, Qt::RightButton, Qt::RightButton));
+  trigger("put_down");
+  EXPECT_FALSE(pen(QEvent::TabletPress, middle(), 0.5, Qt::LeftButton, Qt::LeftButton));
+}
+
+TEST_F(WindowTest, ASpaceMouseTurnsTheToolAndMovesTheBone) {
+  open();
+  click_tool("drill");
+  hover(middle());
+  ASSERT_TRUE(until([&] { return view_->pointer().on_bone(); }));
+  const auto axis = [&] { return Vec3(view_->pointer().input().rotation_bone_tool * Vec3::UnitZ()); };
+  const CameraView before = view_->camera();
+  const Vec3 straight = axis();
+  // All the way to the right about the picture's vertical, for 0.2 s at 1 rad/s. The picture looks nearly along the
+  // tool, which is then tilted by as much.
+  SpaceMouseState cap;
+  cap.twist = Vec3::UnitY();
+  for (int i = 0; i < 20; ++i) view_->follow_cap(cap, 0.01);
+  EXPECT_NEAR(std::acos(axis().dot(straight)), 0.2, 0.01);
+  EXPECT_EQ(view_->camera().eye_mm, before.eye_mm);
+  cap.twist *= -1.0;
+  for (int i = 0; i < 20; ++i) view_->follow_cap(cap, 0.01);
+  // Each step parts the twist by the tool's axis at its beginning, an error of the order of a step.
+  EXPECT_NEAR((axis() - straight).norm(), 0.0, 1e-3);
+  // Within its rest the cap does nothing.
+  const Vec3 rested = axis();
+  cap.twist = 0.04 * Vec3::UnitX();
+  view_->follow_cap(cap, 0.1);
+  EXPECT_EQ(axis(), rested);
+  // A push moves the bone. Without a tool a twist does too.
+  cap = {};
+  cap.push = Vec3::UnitX();
+  view_->follow_cap(cap, 0.1);
+  const CameraView pushed = view_->camera();
+  EXPECT_GT((pushed.eye_mm - before.eye_mm).norm(), 0.5);
+  trigger("put_down");
+  cap = {};
+  cap.twist = Vec3::UnitY();
+  view_->follow_cap(cap, 0.1);
+  EXPECT_GT((view_->camera().eye_mm - pushed.eye_mm).norm(), 0.5);
 }
 
 TEST_F(WindowTest, AnotherSizeOfTheToolComesIntoTheHand) {

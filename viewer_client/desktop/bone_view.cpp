@@ -3,6 +3,7 @@
 #include <QKeyEvent>
 #include <QMouseEvent>
 #include <QSurfaceFormat>
+#include <QTabletEvent>
 #include <algorithm>
 #include <cmath>
 #include <utility>
@@ -65,7 +66,7 @@ void BoneView::set_holding(bool on) {
   holding_ = on;
   placing_ = placing_ && !on;
   if (!on) {
-    pointer_.release();
+    lift_pen();
     pointer_.leave();
   }
   pointer_moved();
@@ -128,6 +129,16 @@ void BoneView::look_tool() {
 }
 
 void BoneView::set_following(bool on) { follows_ = following_ = on; }
+
+void BoneView::follow_cap(const SpaceMouseState& cap, double dt_s) {
+  constexpr double kRest = 0.05, kFastest_rad_per_s = 1.0;
+  const Vec3 push = beyond_rest(cap.push, kRest), twist = beyond_rest(cap.twist, kRest);
+  if (push.isZero() && twist.isZero()) return;
+  if (!holding_) return look(held_by_cap(camera(), push, twist, dt_s));
+  pointer_.twist(camera(), kFastest_rad_per_s * dt_s * twist);
+  if (!push.isZero()) look(held_by_cap(camera(), push, Vec3::Zero(), dt_s));
+  pointer_moved();
+}
 
 void BoneView::follow_tool() {
   if (!following_ || !updater_ || updater_->states().empty()) return;
@@ -245,6 +256,37 @@ void BoneView::mouseReleaseEvent(QMouseEvent* event) {
   if (event->buttons() == Qt::NoButton) camera_drag_ = false;
 }
 
+// The pen's tip on the tablet is the button, and its pressure the push. What is ignored here comes back as an event of
+// the mouse: the pen's other buttons, and the pen without a tool or beside the bone.
+void BoneView::tabletEvent(QTabletEvent* event) {
+  event->ignore();
+  if (!holding_ || camera_drag_ || (event->buttons() & ~Qt::MouseButtons(Qt::LeftButton)) != Qt::NoButton) return;
+  const QPoint at = event->pos();
+  if (event->type() == QEvent::TabletRelease) {
+    if (!wheel_push_n_) return;
+    lift_pen();
+    point_at(at);
+  } else {
+    last_ = at;
+    pointer_.set_fine(event->modifiers() & Qt::ShiftModifier);
+    point_at(at);
+    if (event->type() == QEvent::TabletPress && event->button() == Qt::LeftButton) {
+      if (!pointer_.press()) return;
+      wheel_push_n_ = pointer_.push_n();
+      if (events_.pressed) events_.pressed();
+    }
+    if (wheel_push_n_) pointer_.set_push(kLeastPush_n + event->pressure() * (kMostPush_n - kLeastPush_n));
+  }
+  event->accept();
+  pointer_moved();
+}
+
+void BoneView::lift_pen() {
+  pointer_.release();
+  if (wheel_push_n_) pointer_.set_push(*wheel_push_n_);
+  wheel_push_n_.reset();
+}
+
 void BoneView::wheelEvent(QWheelEvent* event) {
   const double notches = event->angleDelta().y() / kNotch;
   const bool sets_push = holding_ && pointer_.on_bone() && !(event->modifiers() & Qt::ControlModifier);
@@ -288,7 +330,7 @@ void BoneView::keyReleaseEvent(QKeyEvent* event) {
 void BoneView::focusOutEvent(QFocusEvent* event) {
   QVTKOpenGLNativeWidget::focusOutEvent(event);
   // A hand that the user cannot see any more must not push on.
-  pointer_.release();
+  lift_pen();
   pointer_moved();
 }
 

@@ -1,6 +1,6 @@
 // The picture of the bone in the window, and the mouse over it. Without a tool the left button turns the bone, as in an
 // image viewer. With a tool the left button pushes, the right button turns the tool, and the wheel sets the push. The
-// middle button always moves the camera.
+// middle button always moves the camera. A pen pushes with its tip, as hard as it is pressed.
 #pragma once
 #include <QCoreApplication>
 #include <QPoint>
@@ -12,6 +12,7 @@
 
 #include <QVTKOpenGLNativeWidget.h>
 
+#include "common/input/space_mouse_report.hpp"
 #include "viewer_client/render/bone_scene.hpp"
 #include "viewer_client/render/scene_updater.hpp"
 #include "viewer_client/scene/tool_pointer.hpp"
@@ -56,6 +57,9 @@ class BoneView : public QVTKOpenGLNativeWidget {
   // The camera goes after the first tool, until look() or the mouse moves it. look_tool() sends it after the tool
   // again.
   void set_following(bool on);
+  // The cap of a SpaceMouse was held so for dt_s. Its twist turns the tool in the hand, and its push moves the bone.
+  // Without a tool the bone follows both.
+  void follow_cap(const SpaceMouseState& cap, double dt_s);
   [[nodiscard]] bool following() const { return following_; }
   void set_notice(const QString& notice);
   // How the bone is drawn. It holds for the rooms that follow too.
@@ -76,6 +80,7 @@ class BoneView : public QVTKOpenGLNativeWidget {
   void mousePressEvent(QMouseEvent* event) override;
   void mouseMoveEvent(QMouseEvent* event) override;
   void mouseReleaseEvent(QMouseEvent* event) override;
+  void tabletEvent(QTabletEvent* event) override;
   void wheelEvent(QWheelEvent* event) override;
   void leaveEvent(QEvent* event) override;
   void keyPressEvent(QKeyEvent* event) override;
@@ -91,6 +96,7 @@ class BoneView : public QVTKOpenGLNativeWidget {
   void camera_moved();
   void follow_tool();
   void pointer_moved();
+  void lift_pen();
 
   Events events_;
   std::unique_ptr<BoneScene> scene_;
@@ -103,6 +109,7 @@ class BoneView : public QVTKOpenGLNativeWidget {
   QPoint last_;             // position of the mouse, device pixels
   QPoint pressed_;          // where a button went down
   bool camera_drag_ = false;
+  std::optional<double> wheel_push_n_;  // while a pen pushes: what the wheel has set
   QString notice_;
   bool marker_ = false;
   Clipping clipping_;

@@ -6,6 +6,7 @@
 #include <QLocale>
 #include <QPainter>
 #include <QPainterPath>
+#include <QProgressBar>
 #include <QVBoxLayout>
 #include <algorithm>
 #include <cmath>
@@ -83,17 +84,45 @@ GaugesPanel::GaugesPanel(QWidget* parent) : QWidget(parent) {
   spindle_ = gauge(tr("Spindle"), "spindle");
   feed_ = gauge(tr("Feed"), "feed");
   density_ = gauge(tr("Density"), "density");
+  budget_ = new QProgressBar;
+  budget_->setObjectName("budget");
+  budget_->setTextVisible(false);
+  budget_->setAccessibleName(tr("Force on the hand, of what the device holds"));
+  budget_words_ = new QLabel;
+  budget_words_->setObjectName("budget_words");
+  budget_words_->setWordWrap(true);
+  saturated_ = new QLabel("⚠ " + tr("The device cannot hold this force: the bone is harder than it feels."));
+  saturated_->setObjectName("saturated");
+  saturated_->setWordWrap(true);
   plot_ = new ScrollingPlot;
   auto* all = new QVBoxLayout(this);
   all->addLayout(form);
+  all->addWidget(budget_);
+  all->addWidget(budget_words_);
+  all->addWidget(saturated_);
   all->addWidget(plot_);
   const QString colours = "<span style='color:#0072b2'>—</span> %1   <span style='color:#e69f00'>- -</span> %2";
   auto* legend = new QLabel(colours.arg(tr("bone"), tr("hand")));
   all->addWidget(legend);
   all->addStretch();
+  show_budget(0.0, std::nullopt);
 }
 
 void GaugesPanel::show_push(double push_n) { push_->setText(tr("%1 N").arg(number(push_n, 0))); }
+
+void GaugesPanel::show_budget(double bone_n, const std::optional<PointerOutput>& hand) {
+  const bool known = hand && hand->device_holds_n > 0.0;
+  budget_->setVisible(known);
+  budget_words_->setVisible(known);
+  saturated_->setVisible(known && hand->saturated);
+  if (!known) return;
+  constexpr int kWhole = 1000;
+  const double hand_n = hand->force_hand_n.norm();
+  budget_->setRange(0, kWhole);
+  budget_->setValue(static_cast<int>(std::lround(kWhole * std::min(1.0, hand_n / hand->device_holds_n))));
+  budget_words_->setText(tr("The bone gives %1 N, the hand gets %2 N, the device holds %3 N.")
+                             .arg(number(bone_n, 1), number(hand_n, 1), number(hand->device_holds_n, 1)));
+}
 
 void GaugesPanel::show(const CuttingState& state, const std::optional<PointerOutput>& hand, double at_s) {
   const double bone_n = state.force_physical_N.norm(), hand_n = hand ? hand->force_hand_n.norm() : 0.0;
@@ -105,6 +134,7 @@ void GaugesPanel::show(const CuttingState& state, const std::optional<PointerOut
   feed_->setText(tr("%1 mm/s").arg(number(state.feed_mm_per_s, 1)));
   const bool in_bone = state.engaged_fraction > 0.0;
   density_->setText(in_bone ? tr("%1 g/cm³").arg(number(state.density_g_cm3, 2)) : QString("–"));
+  show_budget(hand ? hand->force_bone_n.norm() : bone_n, hand);
   plot_->add(at_s, bone_n, hand_n);
 }
 

@@ -1,5 +1,5 @@
 // What the tool does, in numbers and as a plot of the last seconds: force that the hand gets and that the bone gives,
-// depth, spindle, feed, removed volume.
+// depth, spindle, feed, removed volume. And how much of the hand's force the device can hold.
 #pragma once
 #include <QCoreApplication>
 #include <QWidget>
@@ -10,6 +10,7 @@
 #include "common/mechanics/cutting_state.hpp"
 
 class QLabel;
+class QProgressBar;
 
 namespace osteon {
 
@@ -44,7 +45,10 @@ class GaugesPanel : public QWidget {
   void show_push(double push_n);
 
  private:
+  void show_budget(double bone_n, const std::optional<PointerOutput>& hand);
   QLabel *bone_, *hand_, *torque_, *depth_, *spindle_, *feed_, *density_, *push_;
+  QProgressBar* budget_;  // the force on the hand, of what the device holds for long
+  QLabel *budget_words_, *saturated_;
   ScrollingPlot* plot_;
 };
 

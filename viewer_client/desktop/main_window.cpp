@@ -51,6 +51,7 @@ namespace {
 constexpr int kGaugePeriod_ms = 50;
 // The pointer also sends while it rests, so that the haptic client knows that the window lives.
 constexpr int kPointerPeriod_ms = 50;
+constexpr int kCapPeriod_ms = 16;
 constexpr int kMessage_ms = 8000;
 constexpr const char* kFirstTool = "drill-3.2";
 
@@ -106,6 +107,10 @@ MainWindow::MainWindow() {
   clock_.start();
   connect(&gauge_timer_, &QTimer::timeout, this, [this] { refresh_gauges(); });
   connect(&pointer_timer_, &QTimer::timeout, this, [this] { send_pointer(); });
+  connect(&cap_timer_, &QTimer::timeout, this, [this] {
+    constexpr double kLongest_s = 0.1;
+    view_->follow_cap(space_mouse_.cap(), std::min(kLongest_s, 1e-3 * static_cast<double>(capped_.restart())));
+  });
   const QSettings settings;
   restoreGeometry(settings.value("window/geometry").toByteArray());
   restoreState(settings.value("window/state").toByteArray());
@@ -552,6 +557,8 @@ void MainWindow::show_joined(const WatchedRoom& room) {
   enable_room_actions(true);
   findChild<QAction*>("save_bone")->setEnabled(opened_.has_value());  // others' rooms have the bone at their server
   gauge_timer_.start(kGaugePeriod_ms);
+  capped_.start();
+  cap_timer_.start(kCapPeriod_ms);
   if (pointer_) pointer_timer_.start(kPointerPeriod_ms);
   if (opened_) remember(*opened_);
   view_->setFocus();
@@ -565,6 +572,7 @@ void MainWindow::show_joined(const WatchedRoom& room) {
 void MainWindow::leave_room() {
   gauge_timer_.stop();
   pointer_timer_.stop();
+  cap_timer_.stop();
   put_tool_down();
   undo_points_.clear();
   view_->show_room(nullptr, {});
@@ -691,6 +699,7 @@ void MainWindow::show_help() {
       {tr("Mouse over the bone"), tr("the tool rests where the pointer is")},
       {tr("Left button, held"), tr("the hand pushes")},
       {tr("Wheel"), tr("how hard the hand pushes")},
+      {tr("Pen"), tr("its tip pushes, as hard as you press it")},
       {tr("Right button, dragged"), tr("turns the tool; with Ctrl about its own axis")},
       {tr("Shift"), tr("motions at a tenth")},
       {tr("Space"), tr("spindle on or off")},

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "common/input/pointer_link.hpp"
+#include "common/input/space_mouse.hpp"
 #include "common/wire/credentials.hpp"
 #include "viewer_client/desktop/library.hpp"
 #include "viewer_client/desktop/practice_room.hpp"
@@ -137,8 +138,9 @@ class MainWindow : public QMainWindow {
   bool watching_ = false;
   std::string placing_;  // the item that the next click places
   QString address_, room_name_;
-  QTimer gauge_timer_, pointer_timer_;
-  QElapsedTimer clock_;
+  QTimer gauge_timer_, pointer_timer_, cap_timer_;
+  QElapsedTimer clock_, capped_;  // capped_: since the SpaceMouse was asked last
+  SpaceMouseWatch space_mouse_{[](const std::string&) {}};
 };
 
 }  // namespace osteon

@@ -64,6 +64,21 @@ void ToolPointer::turn(const CameraView& view, double right_rad, double up_rad) 
   aim();
 }
 
+void ToolPointer::twist(const CameraView& view, const Vec3& twist_rad) {
+  const Vec3 back = view.eye_mm - view.target_mm;
+  const Vec3 right = view.up.cross(back);
+  if (!(right.norm() > 0.0) || twist_rad.isZero()) return;
+  const Vec3 about = twist_rad.x() * right.normalized() + twist_rad.y() * back.cross(right).normalized() +
+                     twist_rad.z() * back.normalized();
+  // The part about the tool's own axis only rolls it.
+  const Vec3 axis = input_.rotation_bone_tool * Vec3::UnitZ();
+  const Vec3 tilt = about - about.dot(axis) * axis;
+  const double angle = tilt.norm();
+  roll_rad_ += about.dot(axis);
+  if (angle > 0.0) turn_ = (Eigen::AngleAxisd(angle, tilt / angle) * turn_).normalized();
+  aim();
+}
+
 void ToolPointer::roll(double angle_rad) {
   roll_rad_ += angle_rad;
   aim();

@@ -27,6 +27,8 @@ class ToolPointer {
   void release();
   // Turns the tool by radians about the picture's axes: `right` about its vertical, `up` about its horizontal axis.
   void turn(const CameraView& view, double right_rad, double up_rad);
+  // Turns the tool by an axis times an angle. Frame: the picture's, x right, y up, z to the eye.
+  void twist(const CameraView& view, const Vec3& twist_rad);
   void roll(double angle_rad);  // about its own axis, as of a saw
   void add_push(double newtons);
   void set_push(double newtons);

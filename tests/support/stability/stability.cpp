@@ -114,8 +114,12 @@ class Observer {
     const double turned_mj = torque_nmm_.dot(turned_rad);
     result_.turned_mj -= turned_mj;
     const double s = params_.force_scale;
-    const double cut_mj = s / scale_ * report.cutting.work_mj;
+    // By the closed form of force_scaling.hpp: work of the force that the hand would feel of this one.
+    const double law_n = report.cutting.force_n.norm(), knee_n = params_.compression.knee_n;
+    const double felt = knee_n > 0.0 && law_n > 0.0 ? knee_n * std::log(1.0 + law_n / knee_n) / law_n : 1.0;
+    const double cut_mj = felt * s / scale_ * report.cutting.work_mj;
     episode_mj_ += force_n_.dot(moved_mm) + turned_mj + cut_mj;
+    hand_mj_ += force_n_.dot(moved_mm) + turned_mj;
     result_.cutting_mj += cut_mj;
     result_.least_cutting_n_mm =
         std::min(result_.least_cutting_n_mm, report.cutting.force_n.dot(report.contact.moved_mm));
@@ -149,6 +153,14 @@ class Observer {
       const double explained_n = slew_n + by_hand_n + 2.0 * s * coupling_n_per_mm_ * report.contact.moved_mm.norm();
       result_.fall_n = std::max(result_.fall_n, force_n_.norm() - force_n.norm() - explained_n);
     }
+    constexpr std::uint32_t kLess = kSlewLimited | kEnergyLimited | kRamping | kMissedTicks | kForceLimited;
+    still_ = moved_by_mm < 1e-12 && report.contact.moved_mm.isZero() ? still_ + 1 : 0;
+    if (still_ > 20 && !(report.events & (kLess | kLetGo)) && report.cutting.phase == CuttingPhase::rubbing) {
+      const double bone_n = report.coupling.force_n.norm();
+      const double shown_n = s * (knee_n > 0.0 ? knee_n * std::log(1.0 + bone_n / knee_n) : bone_n);
+      result_.still_off_n = std::max(result_.still_off_n, std::abs(force_n.norm() - shown_n));
+      result_.still += bone_n > 1.0;
+    }
     if (moved_by_mm < 1e-12 && moved_before_mm_ < 1e-12) result_.still_step_n = std::max(result_.still_step_n, step_n);
     // A turn's spring at its arm is the move's at the handle. The slew limit is at the tool's arm.
     const double turn_step_nmm = grown(torque_nmm, torque_nmm_);
@@ -170,6 +182,9 @@ class Observer {
       result_.cut_late_nmm = std::max(result_.cut_late_nmm, cut_nmm);
     }
     result_.force_most_n = std::max(result_.force_most_n, report.device.force_n.norm());
+    result_.cue_most_n = std::max(result_.cue_most_n, report.cue.device_n.norm());
+    result_.budget_over_n =
+        std::max(result_.budget_over_n, report.device.force_n.norm() - (params_.continuous_n + params_.cue_n));
 
     ++result_.ticks;
     result_.late += (report.events & kMissedTicks) != 0;
@@ -190,7 +205,7 @@ class Observer {
   }
   void finish() {
     if (!open_) {
-      episode_mj_ = 0.0;
+      episode_mj_ = hand_mj_ = 0.0;
       return;
     }
     open_ = false;
@@ -198,7 +213,8 @@ class Observer {
     result_.net_mj += episode_mj_;
     result_.generated_mj += std::max(0.0, episode_mj_);
     result_.worst_mj = std::max(result_.worst_mj, episode_mj_);
-    episode_mj_ = 0.0;
+    result_.hand_worst_mj = std::max(result_.hand_worst_mj, hand_mj_);
+    episode_mj_ = hand_mj_ = 0.0;
   }
 
  private:
@@ -207,7 +223,8 @@ class Observer {
   double scale_, coupling_n_per_mm_;
   Vec3 force_n_ = Vec3::Zero(), torque_nmm_ = Vec3::Zero(), handle_mm_ = Vec3::Zero();
   Eigen::Quaterniond rotation_ = Eigen::Quaterniond::Identity();
-  double moved_before_mm_ = 0, cut_nmm_ = 0, episode_mj_ = 0, off_s_ = 0;
+  double moved_before_mm_ = 0, cut_nmm_ = 0, episode_mj_ = 0, hand_mj_ = 0, off_s_ = 0;
+  int still_ = 0;  // ticks in which neither handle nor tool moved
   bool open_ = false, first_ = true;
 };
 
@@ -224,7 +241,7 @@ class Round {
         room_(bone_, static_cast<int>(std::lround(1e-3 * run.delay_ms / run.dt_s))) {
     const SimulatedDeviceParams device =
         number / 2 % 2 ? *find_simulated_device("simulated-3.3N") : SimulatedDeviceParams{};
-    LoopParams params = loop_params(device.limits, 0.0);
+    LoopParams params = loop_params(device.limits, {0.0, run.choice});
     params.dt_s = run.dt_s;
     // Fifty millimetres for each newton that it can hold, like sigma.7 and omega.7.
     if (run.six_axes) params.peak_nmm = kTorqueArm_mm * device.limits.continuous_n;
@@ -244,7 +261,8 @@ class Round {
     loop_->take_up(0, start, mapping);
     device_ = std::make_unique<SimulatedDevice>(device);
     HandParams hand = expert_hand();
-    device_->take(scaled(hand, params.force_scale, mapping.scale()), mapping.pose_device_tool(start).position_mm);
+    device_->take(scaled(hand, params.scale_of(hand.push_n), mapping.scale()),
+                  mapping.pose_device_tool(start).position_mm);
     gesture_ = std::make_unique<Gesture>(run.scene, rig_, loop_->coupling_n_per_mm(), random_);
     observer_ = std::make_unique<Observer>(result, params, mapping.scale(), loop_->coupling_n_per_mm());
     if (run.six_axes) wrist_ = std::make_unique<Wrist>(random_, params.force_scale / mapping.scale());
@@ -370,14 +388,17 @@ void StabilityResult::add(const StabilityResult& other) {
       turned_mj += other.turned_mj;
   worst_mj = std::max(worst_mj, other.worst_mj);
   least_cutting_n_mm = std::min(least_cutting_n_mm, other.least_cutting_n_mm);
-  pushed_back += other.pushed_back;
-  for (double StabilityResult::*most :
-       {&StabilityResult::pushed_back_most_mj, &StabilityResult::step_over_n, &StabilityResult::still_step_n,
-        &StabilityResult::fall_n, &StabilityResult::motor_over_n, &StabilityResult::motor_late_n,
-        &StabilityResult::motor_most_n, &StabilityResult::force_most_n, &StabilityResult::deepest_mm,
-        &StabilityResult::turn_step_over_n, &StabilityResult::cut_step_over_n, &StabilityResult::cut_over_nmm,
-        &StabilityResult::cut_late_nmm, &StabilityResult::cut_most_nmm, &StabilityResult::torque_most_nmm,
-        &StabilityResult::torque_over_nmm})
+  pushed_back += other.pushed_back, still += other.still;
+  for (double StabilityResult::*most : {&StabilityResult::pushed_back_most_mj, &StabilityResult::step_over_n,
+                                        &StabilityResult::still_step_n,        &StabilityResult::fall_n,
+                                        &StabilityResult::motor_over_n,        &StabilityResult::motor_late_n,
+                                        &StabilityResult::motor_most_n,        &StabilityResult::force_most_n,
+                                        &StabilityResult::deepest_mm,          &StabilityResult::turn_step_over_n,
+                                        &StabilityResult::cut_step_over_n,     &StabilityResult::cut_over_nmm,
+                                        &StabilityResult::cut_late_nmm,        &StabilityResult::cut_most_nmm,
+                                        &StabilityResult::torque_most_nmm,     &StabilityResult::torque_over_nmm,
+                                        &StabilityResult::hand_worst_mj,       &StabilityResult::still_off_n,
+                                        &StabilityResult::budget_over_n,       &StabilityResult::cue_most_n})
     this->*most = std::max(this->*most, other.*most);
 }
 

@@ -5,6 +5,7 @@
 #include <cstdint>
 
 #include "haptic_client/device/simulated_device.hpp"
+#include "haptic_client/rendering/force_scaling.hpp"
 
 namespace osteon::test {
 
@@ -20,6 +21,7 @@ struct StabilityRun {
   bool others = true;  // cut near the tool, and undo under it
   // The device also shows torque. The hand tilts its handle by up to 15 degrees and yields to that torque.
   bool six_axes = false;
+  haptic::ForceChoice choice = haptic::ForceChoice::proportional;
   std::uint64_t seed = 1;
 };
 
@@ -27,10 +29,15 @@ struct StabilityResult {
   std::int64_t ticks = 0, late = 0, touching = 0, cutting = 0, uncovered = 0, held_back = 0, returned = 0,
                slew_limited = 0;
   std::uint64_t episodes = 0, others_cuts = 0, undone = 0;
-  double generated_mj = 0;        // over all contacts that gave more than they got
-  double worst_mj = 0;            // most of one contact
-  double net_mj = 0;              // over all contacts; negative: what the coupling took
-  double cutting_mj = 0;          // work of the cutting forces, at the handle
+  double generated_mj = 0;   // over all contacts that gave more than they got
+  double worst_mj = 0;       // most of one contact
+  double hand_worst_mj = 0;  // likewise of the hand alone, without what went into cutting
+  double budget_over_n = 0;  // of the whole force over the device's continuous force
+  double cue_most_n = 0;
+  double still_off_n = 0;  // while the handle stood still: of the coupling's force from the closed form of its scaling
+  std::int64_t still = 0;  // number of such ticks with force
+  double net_mj = 0;       // over all contacts; negative: what the coupling took
+  double cutting_mj = 0;   // work of the cutting forces, at the handle
   double least_cutting_n_mm = 0;  // of all ticks' F_cut · dx
   // Ticks that had to be made rubbing for that, because turning pushed back what was cut, and the largest work that one
   // would have given.

@@ -45,7 +45,8 @@ PointerOutput an_output() {
   output.force_bone_n = {3.0, 0.0, -28.0};
   output.push_n = 29.0;
   output.depth_mm = 4.5;
-  output.pushing = output.on_metal = true;
+  output.pushing = output.on_metal = output.saturated = true;
+  output.device_holds_n = 0.88;
   output.tool = "burr-round-5";
   output.trouble = "the tool \"größer\" cannot be held";
   return output;
@@ -60,6 +61,8 @@ void expect_same(const PointerOutput& a, const PointerOutput& b) {
   EXPECT_EQ(a.depth_mm, b.depth_mm);
   EXPECT_EQ(a.pushing, b.pushing);
   EXPECT_EQ(a.on_metal, b.on_metal);
+  EXPECT_EQ(a.saturated, b.saturated);
+  EXPECT_EQ(a.device_holds_n, b.device_holds_n);
   EXPECT_EQ(a.tool, b.tool);
   EXPECT_EQ(a.trouble, b.trouble);
 }
@@ -142,7 +145,7 @@ void expect_each_refused(const std::string& valid, const Wrong& wrong, Refusal r
 
 TEST(PointerMessage, EachFieldOfTheWindowIsChecked) {
   expect_each_refused(encode(an_input()),
-                      {{"version", {nullptr, 0, 2, -1, 1.5, "1", true}},
+                      {{"version", {nullptr, 0, 1, -1, 1.5, "2", true}},
                        {"target_mm", no_vector(1e5)},
                        {"rotation", kNoUnitRotation},
                        {"on_bone", kNoBool},
@@ -157,7 +160,7 @@ TEST(PointerMessage, EachFieldOfTheWindowIsChecked) {
 
 TEST(PointerMessage, EachFieldOfTheHapticClientIsChecked) {
   expect_each_refused(encode(an_output()),
-                      {{"version", {nullptr, 0, 2, -1, 1.5, "1", true}},
+                      {{"version", {nullptr, 0, 1, -1, 1.5, "2", true}},
                        {"position_mm", no_vector(1e5)},
                        {"rotation", kNoUnitRotation},
                        {"force_hand_n", no_vector(1e6)},
@@ -166,6 +169,8 @@ TEST(PointerMessage, EachFieldOfTheHapticClientIsChecked) {
                        {"depth_mm", no_number(-1e5, 1e5)},
                        {"pushing", kNoBool},
                        {"on_metal", kNoBool},
+                       {"saturated", kNoBool},
+                       {"device_holds_n", no_number(0.0, 1e6)},
                        {"tool", kNoText},
                        {"trouble", kNoText}},
                       output_refusal);

@@ -86,7 +86,7 @@ void expect_each_refused(const std::string& valid, const std::vector<std::pair<c
   EXPECT_EQ(wrong.size(), message.size()) << "a field is not tested";
 }
 
-const std::vector<json> kNoVersion{nullptr, 0, 2, 1.5, "1", true};
+const std::vector<json> kNoVersion{nullptr, 0, 1, 1.5, "2", true};
 
 TEST(SoundMessage, EachFieldIsChecked) {
   const auto no_number = [](double least, double most) {

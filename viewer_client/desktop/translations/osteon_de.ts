@@ -232,6 +232,18 @@
         <translation>Kraft auf die Hand</translation>
     </message>
     <message>
+        <source>Force on the hand, of what the device holds</source>
+        <translation>Kraft auf die Hand, gemessen an dem, was das Gerät hält</translation>
+    </message>
+    <message>
+        <source>The device cannot hold this force: the bone is harder than it feels.</source>
+        <translation>Das Gerät kann diese Kraft nicht halten: Der Knochen ist härter, als er sich anfühlt.</translation>
+    </message>
+    <message>
+        <source>The bone gives %1 N, the hand gets %2 N, the device holds %3 N.</source>
+        <translation>Der Knochen gibt %1 N, die Hand bekommt %2 N, das Gerät hält %3 N.</translation>
+    </message>
+    <message>
         <source>Torque</source>
         <translation>Drehmoment</translation>
     </message>
@@ -682,6 +694,14 @@
     <message>
         <source>the hand pushes</source>
         <translation>Die Hand drückt</translation>
+    </message>
+    <message>
+        <source>Pen</source>
+        <translation>Stift</translation>
+    </message>
+    <message>
+        <source>its tip pushes, as hard as you press it</source>
+        <translation>seine Spitze drückt, so stark wie Sie sie aufdrücken</translation>
     </message>
     <message>
         <source>Wheel</source>
