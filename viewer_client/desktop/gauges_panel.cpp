@@ -105,6 +105,16 @@ GaugesPanel::GaugesPanel(QWidget* parent) : QWidget(parent) {
   auto* legend = new QLabel(colours.arg(tr("bone"), tr("hand")));
   all->addWidget(legend);
   all->addStretch();
+  // Their places stay, so that what comes and goes does not move the picture.
+  for (QWidget* part :
+       {static_cast<QWidget*>(budget_), static_cast<QWidget*>(budget_words_), static_cast<QWidget*>(saturated_)}) {
+    QSizePolicy keeps = part->sizePolicy();
+    keeps.setRetainSizeWhenHidden(true);
+    part->setSizePolicy(keeps);
+  }
+  PointerOutput any;
+  any.device_holds_n = 1.0;
+  show_budget(0.0, any);
   show_budget(0.0, std::nullopt);
 }
 
