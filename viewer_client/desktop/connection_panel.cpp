@@ -54,7 +54,8 @@ QString text_of_server(const ConnectionState& state) {
 QString text_of_haptic(const ConnectionState& state) {
   if (!state.practice) return PanelText::tr("not in this window");
   QString measured;
-  if (state.pointer_silence_ms) measured = PanelText::tr("heard %1 ago").arg(in_ms(*state.pointer_silence_ms));
+  if (state.pointer_silence_ms)
+    measured = PanelText::tr("heard %1 ms ago").arg(QLocale().toString(*state.pointer_silence_ms, 'f', 0));
   return text_of_program(state.haptic, measured);
 }
 

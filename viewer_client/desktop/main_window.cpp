@@ -19,6 +19,7 @@
 #include <QMenuBar>
 #include <QMessageBox>
 #include <QMimeData>
+#include <QScrollArea>
 #include <QSettings>
 #include <QStackedWidget>
 #include <QStandardPaths>
@@ -142,8 +143,11 @@ void MainWindow::make_panels() {
   dock(tr("Tool"), "tool_panel", properties_, Qt::RightDockWidgetArea);
   dock(tr("Gauges"), "gauges_panel", gauges_, Qt::RightDockWidgetArea);
   dock(tr("Open the bone"), "clipping_panel", clipping_, Qt::RightDockWidgetArea)->hide();
-  QDockWidget* connections = dock(tr("Connections"), "connection_panel",
-                                  new ConnectionPanel([this] { return this->connections(); }), Qt::RightDockWidgetArea);
+  auto* scrolled = new QScrollArea;  // its sentences would make the window higher than a small screen
+  scrolled->setFrameShape(QFrame::NoFrame);
+  scrolled->setWidgetResizable(true);
+  scrolled->setWidget(new ConnectionPanel([this] { return this->connections(); }));
+  QDockWidget* connections = dock(tr("Connections"), "connection_panel", scrolled, Qt::RightDockWidgetArea);
   connections->hide();
   connections->toggleViewAction()->setObjectName("connections");
   connections->toggleViewAction()->setShortcut(QKeySequence("Ctrl+Shift+N"));

@@ -108,7 +108,7 @@ void Tour::place() {
   if (seen) {
     const QRect rect(target->mapTo(frame, QPoint(0, 0)), target->size());
     ring_->setGeometry(rect.adjusted(-kRing_px, -kRing_px, kRing_px, kRing_px));
-    if (rect.width() > width() + 2 * kGap_px && rect.height() > 2 * height())
+    if (3 * rect.width() > 2 * width() && rect.height() > 2 * height())
       at = {rect.left() + kGap_px, rect.bottom() - height() - kGap_px};  // within a large one
     else if (rect.height() > rect.width())
       at = {rect.right() + kGap_px, rect.top() + kGap_px};

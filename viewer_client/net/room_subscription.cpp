@@ -465,7 +465,8 @@ void RoomSubscription::look(const ViewFrustum& from) {
 bool RoomSubscription::interrupted() const { return impl_->interrupted.load(); }
 
 Result<RoomAnswer> RoomSubscription::ping() {
-  const auto answer = ask(joined().channel, &v1::RoomService::Stub::ListTools, v1::ListToolsRequest{});
+  v1::ListToolsRequest request;
+  const auto answer = impl_->ask_as_author(&v1::RoomService::Stub::ListTools, request);
   return answer ? Result<RoomAnswer>(RoomAnswer{}) : tl::unexpected(answer.error());
 }
 

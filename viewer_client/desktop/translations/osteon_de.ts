@@ -105,10 +105,6 @@
         <translation>nicht in diesem Fenster</translation>
     </message>
     <message>
-        <source>heard %1 ago</source>
-        <translation>gehört vor %1</translation>
-    </message>
-    <message>
         <source>none</source>
         <translation>keines</translation>
     </message>
@@ -215,6 +211,10 @@
     <message>
         <source>started again: %1</source>
         <translation>neu gestartet: %1</translation>
+    </message>
+    <message>
+        <source>heard %1 ms ago</source>
+        <translation>gehört vor %1 ms</translation>
     </message>
 </context>
 <context>
