@@ -25,6 +25,7 @@
 #include <QToolBar>
 #include <QUrl>
 #include <algorithm>
+#include <initializer_list>
 #include <utility>
 
 #include "common/tools/tool.hpp"
@@ -34,6 +35,7 @@
 #include "viewer_client/desktop/language.hpp"
 #include "viewer_client/desktop/menu_keys.hpp"
 #include "viewer_client/desktop/properties_panel.hpp"
+#include "viewer_client/desktop/risk_gauge.hpp"
 #include "viewer_client/desktop/start_page.hpp"
 #include "viewer_client/desktop/tool_bar.hpp"
 #include "viewer_client/desktop/tool_names.hpp"
@@ -47,6 +49,7 @@ constexpr int kGaugePeriod_ms = 50;
 // The pointer also sends while it rests, so that the haptic client knows that the window lives.
 constexpr int kPointerPeriod_ms = 50;
 constexpr int kMessage_ms = 8000;
+constexpr double kMostRiskLimit_mm = 50.0;
 constexpr const char* kFirstTool = "drill-3.2";
 
 // What changes the room, beside the tools.
@@ -203,6 +206,8 @@ void MainWindow::make_view_menu() {
       [this](QMenu* menu, const QString& words, const char* name, const QKeySequence& keys,
              std::function<void()> call) { return add_action(menu, words, name, keys, std::move(call), true); },
       [this](const QString& sentence) { say(sentence); }, this);
+  add_action(
+      view, tr("Warn near structures at risk…"), "risk_limit", {}, [this] { choose_risk_limit(); }, false);
   view->addSeparator();
   QMenu* panels = view->addMenu(tr("Panels"));
   for (QDockWidget* panel : findChildren<QDockWidget*>()) panels->addAction(panel->toggleViewAction());
@@ -264,13 +269,17 @@ void MainWindow::make_actions() {
 }
 
 void MainWindow::make_status() {
+  risk_ = new RiskGauge;
+  risk_->setObjectName("risk");
   device_ = new QLabel;
   device_->setObjectName("device");
   position_ = new QLabel;
   position_->setObjectName("position");
   connection_ = new QLabel;
   connection_->setObjectName("connection");
-  for (QLabel* label : {device_, position_, connection_}) statusBar()->addPermanentWidget(label);
+  for (QLabel* label : std::initializer_list<QLabel*>{risk_, device_, position_, connection_})
+    statusBar()->addPermanentWidget(label);
+  risk_->hide();  // the bar has shown it
 }
 
 void MainWindow::enable_room_actions(bool on) {
@@ -288,7 +297,7 @@ void MainWindow::say(const QString& sentence) {
   constexpr int kMargin_px = 60;  // they grow with what they say
   if (!position_->text().isEmpty()) {
     room = width;
-    for (const QLabel* label : {device_, position_, connection_})
+    for (const QLabel* label : std::initializer_list<const QLabel*>{risk_, device_, position_, connection_})
       if (label->isVisible() && !label->text().isEmpty()) room = std::min(room, label->x());
   }
   const QString shown =
@@ -531,6 +540,7 @@ void MainWindow::leave_room() {
   put_tool_down();
   undo_points_.clear();
   view_->show_room(nullptr, {});
+  risk_->set_plan(nullptr);
   room_.reset();
   practice_.reset();
   pointer_.reset();
@@ -676,8 +686,20 @@ void MainWindow::refresh_gauges() {
                            .arg(QLocale().toString(at.x(), 'f', 1), QLocale().toString(at.y(), 'f', 1),
                                 QLocale().toString(at.z(), 'f', 1)));
   }
+  risk_->set_plan(updater != nullptr ? updater->plan() : nullptr);
+  const bool any = updater != nullptr && !updater->states().empty();
+  risk_->show_tip(any ? std::optional(updater->states().front().pose_bone_tool.position_mm) : std::nullopt);
+  if (const QString fault = QString::fromStdString(view_->take_plan_fault()); !fault.isEmpty()) say(fault);
   if (pointer_) device_->setText(pointer_->connected() ? tr("Pointer") : tr("The pointer's device is away"));
   if (hand && !hand->trouble.empty()) say(QString::fromStdString(hand->trouble));
+}
+
+void MainWindow::choose_risk_limit() {
+  bool ok = false;
+  const double limit_mm =
+      QInputDialog::getDouble(this, tr("Structures at risk"), tr("Warn when the tip is nearer than, mm"),
+                              risk_->limit_mm(), 0.0, kMostRiskLimit_mm, 1, &ok);
+  if (ok) risk_->set_limit_mm(limit_mm);
 }
 
 void MainWindow::closeEvent(QCloseEvent* event) {

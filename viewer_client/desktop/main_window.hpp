@@ -27,6 +27,7 @@ class BoneView;
 class ClippingPanel;
 class GaugesPanel;
 class PropertiesPanel;
+class RiskGauge;
 class StartPage;
 class SurgeryToolBar;
 class ViewOptions;
@@ -102,6 +103,7 @@ class MainWindow : public QMainWindow {
   void save_picture();
   void show_help();
   void refresh_gauges();
+  void choose_risk_limit();
   void say(const QString& sentence);
   void enable_room_actions(bool on);
   void set_watching(bool on);
@@ -114,6 +116,7 @@ class MainWindow : public QMainWindow {
   PropertiesPanel* properties_ = nullptr;
   ClippingPanel* clipping_ = nullptr;
   ViewOptions* view_options_ = nullptr;
+  RiskGauge* risk_ = nullptr;
   QLabel *position_ = nullptr, *device_ = nullptr, *connection_ = nullptr;
   std::vector<QAction*> room_actions_;
   QAction *sound_ = nullptr, *spindle_ = nullptr;

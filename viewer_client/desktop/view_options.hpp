@@ -33,6 +33,9 @@ class ViewOptions : public QObject {
 
  private:
   void add_stereo(QMenu& menu, const Add& add);
+  // An action that is on or off, and kept in the settings.
+  QAction* add_switch(QMenu& menu, const Add& add, const QString& words, const char* name, const QKeySequence& keys,
+                      std::function<void(bool)> change);
   void set_stereo(StereoMode mode);
   void keep_view();
   void forget_views();
@@ -43,7 +46,6 @@ class ViewOptions : public QObject {
   BoneView& view_;
   Say say_;
   QString title_;
-  QAction* marker_ = nullptr;
   std::vector<QAction*> stereo_;  // by StereoMode
   std::vector<QAction*> kept_;
 };

@@ -12,6 +12,7 @@
 
 #include "common/core/result.hpp"
 #include "common/mechanics/cutting_state.hpp"
+#include "common/surface/surgical_plan.hpp"
 #include "common/tools/annotation.hpp"
 #include "common/tools/scene_item.hpp"
 #include "viewer_client/render/image.hpp"
@@ -56,6 +57,13 @@ class BoneScene {
 
   void look(const CameraView& view);
   [[nodiscard]] CameraView camera() const;
+
+  // What is planned, and the structures at risk. Nothing of it is drawn before show_planned() and show_risks().
+  void show_plan(const SurgicalPlan& plan);
+  // Axes, planes and regions, through the bone too.
+  void show_planned(bool on);
+  // Structures at risk: translucent before the bone, and fainter behind it.
+  void show_risks(bool on);
 
   // The cube that names the patient's sides. It is off at first.
   void show_marker(bool on);

@@ -592,6 +592,18 @@
         <source>the left button and the wheel move the view</source>
         <translation>Linke Taste und Rad bewegen die Ansicht</translation>
     </message>
+    <message>
+        <source>Warn near structures at risk…</source>
+        <translation>Bei gefährdeten Strukturen warnen…</translation>
+    </message>
+    <message>
+        <source>Structures at risk</source>
+        <translation>Gefährdete Strukturen</translation>
+    </message>
+    <message>
+        <source>Warn when the tip is nearer than, mm</source>
+        <translation>Warnen, wenn die Spitze näher ist als, mm</translation>
+    </message>
 </context>
 <context>
     <name>PracticeRoom</name>
@@ -710,6 +722,25 @@
     <message>
         <source>Esc</source>
         <translation>Esc</translation>
+    </message>
+</context>
+<context>
+    <name>RiskGauge</name>
+    <message>
+        <source>Distance to the nearest structure at risk</source>
+        <translation>Abstand zur nächsten gefährdeten Struktur</translation>
+    </message>
+    <message>
+        <source>Inside %1</source>
+        <translation>In: %1</translation>
+    </message>
+    <message>
+        <source>Near %1: %2 mm</source>
+        <translation>Nahe an %1: %2 mm</translation>
+    </message>
+    <message>
+        <source>%1: %2 mm</source>
+        <translation>%1: %2 mm</translation>
     </message>
 </context>
 <context>
@@ -990,6 +1021,14 @@
     <message>
         <source>Kept as view %1.</source>
         <translation>Als Ansicht %1 gemerkt.</translation>
+    </message>
+    <message>
+        <source>Planned axes and regions</source>
+        <translation>Geplante Achsen und Bereiche</translation>
+    </message>
+    <message>
+        <source>Structures at risk</source>
+        <translation>Gefährdete Strukturen</translation>
     </message>
 </context>
 </TS>
