@@ -6,6 +6,7 @@
 #include <numbers>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "common/surface/block_source.hpp"
 #include "common/volume/cut_field.hpp"
@@ -118,6 +119,55 @@ TEST_F(BonePicture, MetalAndEnamelHaveColoursOfTheirOwn) {
   EXPECT_GT(cut_bone.x() / cut_bone.y(), 1.25 * bone.x() / bone.y());
   EXPECT_GT((cut_enamel - cut_bone).norm(), 40.0);
   EXPECT_GT((cut_enamel - enamel).norm(), 12.0);
+}
+
+// The bone around a groove, whose blocks are finer than the bone's, keeps its own colour: to a cell of the bone beside
+// the groove, no pixel has that of the cut.
+TEST_F(BonePicture, NoPixelOffTheCutHasItsColour) {
+  constexpr double kPitch = 0.8;
+  for (const int level : {1, 2}) {
+    CutField field(test::make_bone(
+                       {Vec3::Constant(-15), Vec3::Constant(15)}, kPitch, [](const Vec3& p) { return p.norm() - 12.0; },
+                       [](const Vec3&) { return 1.9; }),
+                   BodyId{});
+    SurfaceBlocks blocks{BodyId{}};
+    const Vec3 from(-3, -11, 0), to(3, -11, 1), axis(0, 1, 0);
+    Cut groove = test::straight_cut(*find_tool("burr-round-5"), from, to, axis);
+    groove.level = level;
+    (void)blocks.touch(level, field.apply(groove).changed_leaves);
+    std::vector<BlockKey> keys = blocks.fine_blocks();
+    for (int x = -2; x <= 1; ++x)
+      for (int y = -2; y <= 1; ++y)
+        for (int z = -2; z <= 1; ++z) keys.push_back({{}, 0, {x, y, z}});
+    int region = 0;
+    for (const BlockKey& key : keys) {
+      BlockSamples samples;
+      gather_block(field, blocks, key, kPitch, samples);
+      const auto mesh = decode_block(key, encode_block(samples), level_pitch_mm(kPitch, key.level));
+      ASSERT_TRUE(mesh);
+      window_->scene().show_region({BodyId{0}, 0, {region++, 0, 0}}, *mesh);
+    }
+    int on_cut = 0, off_cut = 0;
+    for (const Vec3& eye : {Vec3(0, -90, 0), Vec3(50, -70, 20), Vec3(-40, -70, -50)}) {
+      CameraView view = from_front(90.0);
+      view.eye_mm = eye;
+      window_->scene().look(view);
+      const Image image = drawn();
+      for (int x = 0; x < kWidth; x += 2)
+        for (int y = 0; y < kHeight; y += 2) {
+          const auto& [r, g, b] = image.at(x, y);
+          // Bone has 1.07 times as much red as green, a cut 1.53 times.
+          if (r < 60 || r < 1.25 * g) continue;
+          const auto at = window_->scene().surface_at(x, y);
+          if (!at) continue;
+          const Vec3 centre = *at + 2.5 * axis - from, along = to - from;
+          const double away = (centre - std::clamp(centre.dot(along) / along.squaredNorm(), 0.0, 1.0) * along).norm();
+          ++(away < 2.5 + kPitch ? on_cut : off_cut);
+        }
+    }
+    EXPECT_GT(on_cut, 300) << level;
+    EXPECT_EQ(off_cut, 0) << level;
+  }
 }
 
 TEST_F(BonePicture, DoesNotDependOnTheOrderOfArrival) {
