@@ -149,4 +149,40 @@ Result<SurgicalPlan> PlanReader::finish() {
   return std::move(plan_);
 }
 
+std::vector<v1::GetDensityResponse> to_wire(const DensityGrid& density) {
+  constexpr int kLeavesOfMessage = 1000;  // half a MiB
+  std::vector<v1::GetDensityResponse> messages(1);
+  for (const auto& [leaf, samples] : density.leaves()) {
+    if (messages.back().leaves_size() == kLeavesOfMessage) messages.emplace_back();
+    v1::DensityLeaf& to = *messages.back().add_leaves();
+    *to.mutable_leaf() = to_wire(leaf);
+    to.set_samples(samples.data(), samples.size());
+  }
+  for (v1::GetDensityResponse& message : messages) message.set_pitch_mm(density.pitch_mm());
+  messages.back().set_complete(true);
+  return messages;
+}
+
+Result<void> DensityReader::add(const v1::GetDensityResponse& message) {
+  if (!(message.pitch_mm() > 0.0) || !std::isfinite(message.pitch_mm()) ||
+      (begun_ && message.pitch_mm() != density_.pitch_mm()))
+    return bad_plan("a density of no pitch");
+  if (!begun_) density_ = DensityGrid(message.pitch_mm());
+  begun_ = true;
+  for (const v1::DensityLeaf& leaf : message.leaves()) {
+    DensityLeaf samples;
+    if (leaf.samples().size() != samples.size() || density_.leaves().size() >= kMostDensityLeaves)
+      return bad_plan("a density of a wrong size");
+    std::copy(leaf.samples().begin(), leaf.samples().end(), samples.begin());
+    density_.add(from_wire(leaf.leaf()), samples);
+  }
+  complete_ = message.complete();
+  return {};
+}
+
+Result<DensityGrid> DensityReader::finish() {
+  if (!complete_) return bad_plan("a density without an end");
+  return std::move(density_);
+}
+
 }  // namespace osteon::wire

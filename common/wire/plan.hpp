@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "common/core/result.hpp"
+#include "common/surface/density_grid.hpp"
 #include "common/surface/surgical_plan.hpp"
 #include "osteon/v1/plan.pb.h"
 
@@ -29,6 +30,20 @@ class PlanReader {
   };
   SurgicalPlan plan_;
   std::vector<Size> sizes_;  // of the structures' surfaces
+  bool begun_ = false, complete_ = false;
+};
+
+// The stream of a density.
+[[nodiscard]] std::vector<v1::GetDensityResponse> to_wire(const DensityGrid& density);
+
+class DensityReader {
+ public:
+  // Error invalid_input for anything that a correct server never sends.
+  [[nodiscard]] Result<void> add(const v1::GetDensityResponse& message);
+  [[nodiscard]] Result<DensityGrid> finish();  // after the last message
+
+ private:
+  DensityGrid density_;
   bool begun_ = false, complete_ = false;
 };
 

@@ -207,7 +207,8 @@ void MainWindow::make_view_menu() {
              std::function<void()> call) { return add_action(menu, words, name, keys, std::move(call), true); },
       [this](const QString& sentence) { say(sentence); }, this);
   add_action(
-      view, tr("Warn near structures at risk…"), "risk_limit", {}, [this] { choose_risk_limit(); }, false);
+      view_options_->overlays(), tr("Warn near structures at risk…"), "risk_limit", {}, [this] { choose_risk_limit(); },
+      false);
   view->addSeparator();
   QMenu* panels = view->addMenu(tr("Panels"));
   for (QDockWidget* panel : findChildren<QDockWidget*>()) panels->addAction(panel->toggleViewAction());

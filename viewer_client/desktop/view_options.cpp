@@ -28,9 +28,10 @@ ViewOptions::ViewOptions(BoneView& view, QMenu& menu, const Add& add, Say say, Q
     : QObject(parent), view_(view), say_(std::move(say)) {
   add_switch(menu, add, tr("Cube of the patient's sides"), "marker", QKeySequence("Ctrl+K"),
              [this](bool on) { view_.show_marker(on); });
-  add_switch(menu, add, tr("Planned axes and regions"), "planned", QKeySequence("Ctrl+L"),
+  overlays_ = menu.addMenu(tr("Overlays"));
+  add_switch(*overlays_, add, tr("Planned axes and regions"), "planned", QKeySequence("Ctrl+L"),
              [this](bool on) { view_.show_planned(on); });
-  add_switch(menu, add, tr("Structures at risk"), "risks", QKeySequence("Ctrl+R"),
+  add_switch(*overlays_, add, tr("Structures at risk"), "risks", QKeySequence("Ctrl+R"),
              [this](bool on) { view_.show_risks(on); });
   add_stereo(*menu.addMenu(tr("Stereo picture")), add);
   QMenu& kept = *menu.addMenu(tr("Kept views"));

@@ -28,6 +28,8 @@ class ViewOptions : public QObject {
   // `view` and the menu must outlive it.
   ViewOptions(BoneView& view, QMenu& menu, const Add& add, Say say, QObject* parent);
 
+  // The menu of what is drawn over the bone.
+  [[nodiscard]] QMenu* overlays() const { return overlays_; }
   // Kept views are of one bone.
   void show_bone(const QString& title);
 
@@ -46,6 +48,7 @@ class ViewOptions : public QObject {
   BoneView& view_;
   Say say_;
   QString title_;
+  QMenu* overlays_ = nullptr;
   std::vector<QAction*> stereo_;  // by StereoMode
   std::vector<QAction*> kept_;
 };

@@ -182,6 +182,11 @@ struct RoomSubscription::Impl {
   void read_cutting();
   void say_looks();
   void read_plan();
+  template <class Request, class Response>
+  using OnceCall = std::unique_ptr<grpc::ClientReader<Response>> (v1::PlanService::Stub::*)(grpc::ClientContext*,
+                                                                                            const Request&);
+  template <class Reader, class Request, class Response>
+  auto read_once(OnceCall<Request, Response> call) -> std::optional<decltype(std::declval<Reader>().finish())>;
   Result<void> read_mesh_stream();
   void fetch_tools(const std::shared_ptr<grpc::Channel>& channel, std::uint64_t author, KnownTools& known);
   // The same request in the name of the viewer's author.
@@ -415,35 +420,51 @@ void RoomSubscription::Impl::say_looks() {
   }
 }
 
-// [plan thread] The plan of a case never changes, so it is read once. A lost connection is tried again after the mesh
-// thread has rejoined.
-void RoomSubscription::Impl::read_plan() {
+// [plan thread] Plan and density of a case never change, so each is read once. A lost connection is tried again after
+// the mesh thread has rejoined. Nothing: the server is older, or the subscription ends.
+template <class Reader, class Request, class Response>
+auto RoomSubscription::Impl::read_once(OnceCall<Request, Response> call)
+    -> std::optional<decltype(std::declval<Reader>().finish())> {
   while (!stopping()) {
     const auto [channel, author] = line();
-    v1::GetPlanRequest request;
+    Request request;
     request.set_author(author);
     grpc::ClientContext context;
-    if (!enter(&Impl::plan_context, context)) return;
-    const auto reader = v1::PlanService::NewStub(channel)->GetPlan(&context, request);
-    wire::PlanReader plan;
+    if (!enter(&Impl::plan_context, context)) return {};
+    const auto stub = v1::PlanService::NewStub(channel);
+    const auto reader = (stub.get()->*call)(&context, request);
+    Reader whole;
     Result<void> outcome;
-    v1::GetPlanResponse message;
-    while (outcome && reader->Read(&message)) outcome = plan.add(message);
+    Response message;
+    while (outcome && reader->Read(&message)) outcome = whole.add(message);
     if (!outcome) context.TryCancel();
     const grpc::Status ended = reader->Finish();
     leave(&Impl::plan_context);
-    if (ended.error_code() == grpc::StatusCode::UNIMPLEMENTED) return;  // an older server
-    Result<SurgicalPlan> whole = outcome ? plan.finish() : tl::unexpected(outcome.error());
-    if (ended.ok() && whole) {
-      whole->bone_mm = room.bounds;
-      return render_queue.put_plan(std::move(*whole));
-    }
+    if (!outcome) return tl::unexpected(outcome.error());
+    if (ended.ok()) return whole.finish();
+    if (ended.error_code() == grpc::StatusCode::UNIMPLEMENTED) return {};  // an older server
     if (ended.error_code() != grpc::StatusCode::UNAVAILABLE && ended.error_code() != grpc::StatusCode::INVALID_ARGUMENT)
-      return render_queue.put_plan_fault("Structures at risk are not shown: " +
-                                         (ended.ok() || !outcome ? whole.error().message : ended.error_message()));
+      return failure(ErrorCode::unavailable, ended.error_message());
     MutexLock lock(mutex);
     changed.wait_for(lock, std::chrono::seconds(1), [&]() OSTEON_REQUIRES(mutex) { return ending || failed; });
-    if (failed) return;
+    if (failed) return {};
+  }
+  return {};
+}
+
+void RoomSubscription::Impl::read_plan() {
+  if (auto plan = read_once<wire::PlanReader>(&v1::PlanService::Stub::GetPlan)) {
+    if (*plan) (*plan)->bone_mm = room.bounds;
+    if (*plan)
+      render_queue.put_plan(std::move(**plan));
+    else
+      render_queue.put_plan_fault("Structures at risk are not shown: " + plan->error().message);
+  }
+  if (auto density = read_once<wire::DensityReader>(&v1::PlanService::Stub::GetDensity)) {
+    if (*density)
+      render_queue.put_density(std::move(**density));
+    else
+      log::warn("cut faces are painted without density", {{"reason", density->error().message}});
   }
 }
 

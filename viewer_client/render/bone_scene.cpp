@@ -81,6 +81,8 @@ void BoneScene::show_region(const RegionKey& region, const Mesh& mesh) {
   if (impl_->bone.show(region, mesh)) impl_->add_in_order();
 }
 
+void BoneScene::set_density(std::shared_ptr<const DensityGrid> density) { impl_->bone.set_density(std::move(density)); }
+
 void BoneScene::show_tools(std::span<const CuttingState> states) {
   if (impl_->tools.show_tools(states)) impl_->add_in_order();
   impl_->people->show_tools(states);

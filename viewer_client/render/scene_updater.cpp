@@ -41,6 +41,11 @@ bool SceneUpdater::update(bool tools_shown) {
     scene_->show_plan(*plan_);
     changed = true;
   }
+  if (delivery.density) {
+    scene_->set_density(std::move(delivery.density));
+    surface_.repaint_cuts();
+    changed = (complete_ && rebuild()) || changed;
+  }
   if (delivery.snapshot_begun) {
     surface_.begin_snapshot();
     complete_ = false;

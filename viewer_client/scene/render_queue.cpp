@@ -52,6 +52,16 @@ void RenderQueue::put_plan(SurgicalPlan plan) {
   announce(first);
 }
 
+void RenderQueue::put_density(DensityGrid density) {
+  bool first = false;
+  {
+    const MutexLock lock(mutex_);
+    next_.density = std::make_shared<const DensityGrid>(std::move(density));
+    first = !std::exchange(waiting_, true);
+  }
+  announce(first);
+}
+
 void RenderQueue::put_plan_fault(std::string sentence) {
   bool first = false;
   {

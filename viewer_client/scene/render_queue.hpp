@@ -13,6 +13,7 @@
 #include "common/core/id.hpp"
 #include "common/core/mutex.hpp"
 #include "common/mechanics/cutting_state.hpp"
+#include "common/surface/density_grid.hpp"
 #include "common/surface/surgical_plan.hpp"
 #include "common/tools/scene_item.hpp"
 #include "viewer_client/scene/surface_scene.hpp"
@@ -42,7 +43,8 @@ struct Delivery {
   // What is planned, and the structures at risk. They come once. Null: they did not come since the last take(). Shared:
   // the picture and whoever measures distances read it.
   std::shared_ptr<const SurgicalPlan> plan;
-  std::string plan_fault;  // a sentence: why there is no plan
+  std::shared_ptr<const DensityGrid> density;  // of the imported bone; it comes once too
+  std::string plan_fault;                      // a sentence: why there is no plan
 };
 
 // Any thread may call any function. One mutex, held only for a few moves.
@@ -55,6 +57,7 @@ class RenderQueue {
   void put_states(std::vector<CuttingState> states, std::vector<SceneItem> items = {}, std::vector<BodyId> bodies = {});
   void put_tool(Tool tool);
   void put_plan(SurgicalPlan plan);
+  void put_density(DensityGrid density);
   void put_plan_fault(std::string sentence);
 
   // Called by the thread that put data, once until the next take(). It must return at once. Call this before data

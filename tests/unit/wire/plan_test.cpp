@@ -61,6 +61,38 @@ TEST(PlanMessages, BringTheWholePlan) {
   EXPECT_TRUE(nothing->empty());
 }
 
+TEST(DensityMessages, BringTheWholeDensityAndNothingWrong) {
+  DensityGrid density(0.5);
+  for (int i = 0; i < 2500; ++i) {
+    DensityLeaf leaf;
+    for (std::size_t k = 0; k < leaf.size(); ++k) leaf[k] = static_cast<std::uint8_t>(i * 7 + static_cast<int>(k));
+    density.add({i - 1000, 3 * i, -i}, leaf);
+  }
+  const auto messages = wire::to_wire(density);
+  EXPECT_EQ(messages.size(), 3u);
+  const auto read = [](const std::vector<v1::GetDensityResponse>& all) -> Result<DensityGrid> {
+    wire::DensityReader reader;
+    for (const v1::GetDensityResponse& message : all)
+      if (Result<void> good = reader.add(message); !good) return tl::unexpected(good.error());
+    return reader.finish();
+  };
+  const auto back = read(messages);
+  ASSERT_TRUE(back);
+  EXPECT_EQ(back->pitch_mm(), 0.5);
+  EXPECT_EQ(back->leaves(), density.leaves());
+  auto cut_off = messages;
+  cut_off.pop_back();
+  EXPECT_FALSE(read(cut_off));
+  auto short_leaf = messages;
+  short_leaf[0].mutable_leaves(0)->mutable_samples()->pop_back();
+  EXPECT_FALSE(read(short_leaf));
+  auto pitches = messages;
+  pitches[1].set_pitch_mm(0.6);
+  EXPECT_FALSE(read(pitches));
+  for (auto& message : pitches) message.set_pitch_mm(0.0);
+  EXPECT_FALSE(read(pitches));
+}
+
 TEST(PlanMessages, AnUnknownKindMayBeAtRisk) {
   auto messages = wire::to_wire(full_plan());
   messages[0].mutable_structures(0)->set_kind(static_cast<v1::StructureKind>(77));

@@ -1030,5 +1030,9 @@
         <source>Structures at risk</source>
         <translation>Gefährdete Strukturen</translation>
     </message>
+    <message>
+        <source>Overlays</source>
+        <translation>Einblendungen</translation>
+    </message>
 </context>
 </TS>
