@@ -31,6 +31,8 @@ constexpr std::array kCalls{
     CallRow{"/osteon.v1.WatchService/WatchMesh", kInRoom},
     CallRow{"/osteon.v1.WatchService/LookFrom", kInRoom},
     CallRow{"/osteon.v1.WatchService/WatchCutting", kInRoom},
+    CallRow{"/osteon.v1.PlanService/GetPlan", kInRoom},
+    CallRow{"/osteon.v1.PlanService/GetDensity", kInRoom},
     // Annotations and messages reach everybody. The stream leaves out what a role may not receive.
     CallRow{"/osteon.v1.PeopleService/WatchPeople", kInRoom},
     CallRow{"/osteon.v1.PeopleService/Supervise", kInstructor},

@@ -24,6 +24,7 @@ class LinkServer;
 [[nodiscard]] std::unique_ptr<grpc::Service> make_cutting_service(Rooms& rooms, LinkServer* links);
 [[nodiscard]] std::unique_ptr<grpc::Service> make_watch_service(Rooms& rooms);
 [[nodiscard]] std::unique_ptr<grpc::Service> make_people_service(Rooms& rooms);
+[[nodiscard]] std::unique_ptr<grpc::Service> make_plan_service(Rooms& rooms);
 [[nodiscard]] std::unique_ptr<grpc::Service> make_room_admin_service(Rooms& rooms);
 [[nodiscard]] std::unique_ptr<grpc::Service> make_case_service(Rooms& rooms);
 // Answers every call that none of these services has.

@@ -36,4 +36,11 @@ std::filesystem::path Desk::bone() {
   return made.exit_code == 0 ? folder : std::filesystem::path();
 }
 
+std::filesystem::path Desk::tibia() {
+  const std::filesystem::path folder = temp_.path() / "tibia";
+  if (std::filesystem::exists(folder)) return folder;
+  const auto made = run(program("osteon-import"), {"phantom", "tibia", "--pitch", "1.5", "--out", folder.string()});
+  return made.exit_code == 0 ? folder : std::filesystem::path();
+}
+
 }  // namespace osteon::test

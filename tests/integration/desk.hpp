@@ -18,6 +18,8 @@ class Desk {
   // The case of a block of bone, 40 mm wide: cortical layers of 5 mm above and below marrow. Empty if osteon-import
   // cannot make it.
   [[nodiscard]] std::filesystem::path bone();
+  // A phantom of a tibia with vessels and a nerve. Empty if osteon-import cannot make it.
+  [[nodiscard]] std::filesystem::path tibia();
   [[nodiscard]] const TempDir& temp() const { return temp_; }
 
  private:

@@ -38,6 +38,7 @@
 #include "tests/integration/desk.hpp"
 #include "viewer_client/desktop/bone_view.hpp"
 #include "viewer_client/desktop/main_window.hpp"
+#include "viewer_client/desktop/risk_gauge.hpp"
 #include "viewer_client/desktop/sound_dialog.hpp"
 #include "viewer_client/desktop/start_page.hpp"
 #include "viewer_client/desktop/tour.hpp"
@@ -364,6 +365,49 @@ TEST_F(WindowTest, AnOpenedBoneIsPointedAtWhereItIsSeen) {
   hover(middle() - QPoint(60, 0));
   EXPECT_TRUE(view_->pointer().on_bone());
   panel->hide();  // the next window opens as this one was left
+}
+
+// A tibia with an artery. The lower bar names what is nearest to the tip, and warns below the chosen distance.
+TEST_F(WindowTest, TheNearestStructureAtRiskIsNamedWithItsDistance) {
+  window_->practise(desk_->tibia());
+  ASSERT_TRUE(until([&] { return view_->surface_shown() && view_->updater()->plan(); })) << problem();
+  ASSERT_TRUE(until([&] { return label("device") == "Pointer"; })) << problem();
+  const std::shared_ptr<const SurgicalPlan> plan = view_->updater()->plan();
+  EXPECT_GT(plan->structures.size(), 3u);
+  EXPECT_GT(plan->axes.size(), 0u);
+  click_tool("drill");
+  view_->look_from(Vec3(0.05, 1, 0.05));
+  ASSERT_TRUE(until([&] {
+    hover(middle());
+    return view_->pointer().on_bone() && !label("risk").isEmpty();
+  })) << problem();
+  auto* gauge = window_->findChild<RiskGauge*>("risk");
+  ASSERT_NE(gauge, nullptr);
+  gauge->set_limit_mm(0.0);
+  EXPECT_TRUE(until([&] { return !gauge->warns(); })) << label("risk").toStdString();
+  gauge->set_limit_mm(500.0);
+  EXPECT_TRUE(until([&] { return gauge->warns() && label("risk").startsWith("Near "); }))
+      << label("risk").toStdString();
+  EXPECT_TRUE(label("risk").endsWith(" mm"));
+  gauge->set_limit_mm(RiskGauge::kUsualLimit_mm);
+  // The picture changes when the menu hides the structures.
+  const auto picture = [&] {
+    const std::uint64_t frames = view_->frames();
+    view_->redraw();
+    EXPECT_TRUE(until([&] { return view_->frames() > frames; }));
+    return view_->scene().image().rgb;
+  };
+  trigger("put_down");
+  hover(QPoint(1, 1));
+  QTest::qWait(300);
+  const auto with = picture();
+  trigger("risks");
+  const auto without = picture();
+  EXPECT_NE(with, without);
+  trigger("planned");
+  EXPECT_NE(picture(), without);
+  trigger("risks");
+  trigger("planned");
 }
 
 // In each of the two pictures the pointer finds the same place of the bone.

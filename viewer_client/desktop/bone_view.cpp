@@ -48,6 +48,8 @@ void BoneView::show_room(RenderQueue* queue, const Box& bounds) {
   scene_.reset();
   scene_ = std::make_unique<BoneScene>(*renderWindow());
   scene_->show_marker(marker_);
+  scene_->show_planned(planned_);
+  scene_->show_risks(risks_);
   (void)scene_->set_stereo(stereo_);
   clipping_.clear();
   bounds_ = bounds;
@@ -156,6 +158,18 @@ void BoneView::set_notice(const QString& notice) {
 void BoneView::show_marker(bool on) {
   marker_ = on;
   scene_->show_marker(on);
+  redraw();
+}
+
+void BoneView::show_planned(bool on) {
+  planned_ = on;
+  scene_->show_planned(on);
+  redraw();
+}
+
+void BoneView::show_risks(bool on) {
+  risks_ = on;
+  scene_->show_risks(on);
   redraw();
 }
 

@@ -64,11 +64,15 @@ class BoneView : public QVTKOpenGLNativeWidget {
   void set_notice(const QString& notice);
   // How the bone is drawn. It holds for the rooms that follow too.
   void show_marker(bool on);
+  void show_planned(bool on);
+  void show_risks(bool on);
   void clip(const Clipping& visible);
   // False: the display does not have the mode, and stereo is off.
   [[nodiscard]] bool set_stereo(StereoMode mode);
 
   [[nodiscard]] const SceneUpdater* updater() const { return updater_ ? &*updater_ : nullptr; }
+  // A sentence why structures at risk are missing, once. Empty: none.
+  [[nodiscard]] std::string take_plan_fault() { return updater_ ? updater_->take_plan_fault() : std::string(); }
   [[nodiscard]] BoneScene& scene() { return *scene_; }
   // Marks the picture as old. It is drawn soon, at most at the display's rate.
   void redraw();
@@ -111,7 +115,7 @@ class BoneView : public QVTKOpenGLNativeWidget {
   bool camera_drag_ = false;
   std::optional<double> wheel_push_n_;  // while a pen pushes: what the wheel has set
   QString notice_;
-  bool marker_ = false;
+  bool marker_ = false, planned_ = false, risks_ = false;
   Clipping clipping_;
   StereoMode stereo_ = StereoMode::off;
   QTimer frame_timer_;

@@ -16,7 +16,6 @@
 #include <QLabel>
 #include <QLineEdit>
 #include <QLocale>
-#include <QMenuBar>
 #include <QMessageBox>
 #include <QMimeData>
 #include <QScrollArea>
@@ -24,10 +23,10 @@
 #include <QStackedWidget>
 #include <QStandardPaths>
 #include <QStatusBar>
-#include <QToolBar>
 #include <QUrl>
 #include <algorithm>
 #include <cmath>
+#include <initializer_list>
 #include <utility>
 
 #include "common/tools/tool.hpp"
@@ -35,9 +34,8 @@
 #include "viewer_client/desktop/clipping_panel.hpp"
 #include "viewer_client/desktop/connection_panel.hpp"
 #include "viewer_client/desktop/gauges_panel.hpp"
-#include "viewer_client/desktop/language.hpp"
-#include "viewer_client/desktop/menu_keys.hpp"
 #include "viewer_client/desktop/properties_panel.hpp"
+#include "viewer_client/desktop/risk_gauge.hpp"
 #include "viewer_client/desktop/sound_control.hpp"
 #include "viewer_client/desktop/start_page.hpp"
 #include "viewer_client/desktop/tool_bar.hpp"
@@ -54,6 +52,7 @@ constexpr int kGaugePeriod_ms = 50;
 constexpr int kPointerPeriod_ms = 50;
 constexpr int kCapPeriod_ms = 16;
 constexpr int kMessage_ms = 8000;
+constexpr double kMostRiskLimit_mm = 50.0;
 constexpr const char* kFirstTool = "drill-3.2";
 
 // What changes the room, beside the tools.
@@ -153,162 +152,18 @@ void MainWindow::make_panels() {
   connections->toggleViewAction()->setShortcut(QKeySequence("Ctrl+Shift+N"));
 }
 
-QAction* MainWindow::add_action(QMenu* menu, const QString& words, const char* name, const QKeySequence& keys,
-                                std::function<void()> call, bool in_room) {
-  auto* made = new QAction(words, this);
-  made->setObjectName(name);
-  made->setShortcut(keys);
-  connect(made, &QAction::triggered, this, [call = std::move(call)] { call(); });
-  menu->addAction(made);
-  if (in_room) room_actions_.push_back(made);
-  return made;
-}
-
-void MainWindow::make_file_menu() {
-  QMenu* file = menuBar()->addMenu(tr("&File"));
-  add_action(
-      file, tr("&Start page"), "start_page", QKeySequence("Ctrl+Home"), [this] { leave_room(); }, true);
-  add_action(
-      file, tr("&Open a case…"), "open_case", QKeySequence::Open, [this] { choose_case(); }, false);
-  add_action(
-      file, tr("&Import a CT…"), "import_scan", QKeySequence("Ctrl+I"), [this] { choose_scan(); }, false);
-  add_action(
-      file, tr("&Join a room…"), "join_room", QKeySequence("Ctrl+J"), [this] { choose_room(); }, false);
-  file->addSeparator();
-  add_action(
-      file, tr("Save a &picture…"), "save_picture", QKeySequence::Save, [this] { save_picture(); }, true);
-  add_action(
-      file, tr("Save &bone as…"), "save_bone", QKeySequence("Ctrl+E"), [this] { save_bone_as(); }, true);
-  file->addSeparator();
-  add_action(
-      file, tr("&Quit"), "quit", QKeySequence::Quit, [this] { close(); }, false);
-}
-
-void MainWindow::make_edit_menu() {
-  QMenu* edit = menuBar()->addMenu(tr("&Edit"));
-  add_action(
-      edit, tr("&Undo"), "undo", QKeySequence::Undo, [this] { undo(); }, true);
-  add_action(
-      edit, tr("&Redo"), "redo", QKeySequence::Redo,
-      [this] { ask([](RoomSubscription& room) { return room.redo(1); }, tr("Done again.")); }, true);
-  add_action(
-      edit, tr("&Mark this moment…"), "mark", QKeySequence("Ctrl+M"), [this] { mark_moment(); }, true);
-}
-
-void MainWindow::make_view_menu() {
-  QMenu* view = menuBar()->addMenu(tr("&View"));
-  add_action(
-      view, tr("&Whole bone"), "overview", Qt::Key_O, [this] { view_->look_overview(); }, true);
-  add_action(
-      view, tr("At the &tool"), "look_tool", Qt::Key_T, [this] { view_->look_tool(); }, true);
-  view->addSeparator();
-  struct Side {
-    QString words;
-    const char* name;
-    const char* keys;
-    Vec3 side;  // LPS: x to the patient's left, y to the back, z to the head
-  };
-  const Side sides[] = {{tr("From the &front"), "front", "Ctrl+1", {0, -1, 0}},
-                        {tr("From the &back"), "back", "Ctrl+2", {0, 1, 0}},
-                        {tr("From the patient's &left"), "left", "Ctrl+3", {1, 0, 0}},
-                        {tr("From the patient's &right"), "right", "Ctrl+4", {-1, 0, 0}},
-                        {tr("From &above"), "above", "Ctrl+5", {0, 0, 1}},
-                        {tr("From b&elow"), "below", "Ctrl+6", {0, 0, -1}}};
-  for (const Side& side : sides)
-    add_action(
-        view, side.words, side.name, QKeySequence(side.keys), [this, from = side.side] { view_->look_from(from); },
-        true);
-  view->addSeparator();
-  add_action(
-      view, tr("F&ull screen"), "full_screen", QKeySequence::FullScreen,
-      [this] { isFullScreen() ? showNormal() : showFullScreen(); }, false);
-  view_options_ = new ViewOptions(
-      *view_, *view,
-      [this](QMenu* menu, const QString& words, const char* name, const QKeySequence& keys,
-             std::function<void()> call) { return add_action(menu, words, name, keys, std::move(call), true); },
-      [this](const QString& sentence) { say(sentence); }, this);
-  view->addSeparator();
-  QMenu* panels = view->addMenu(tr("Panels"));
-  for (QDockWidget* panel : findChildren<QDockWidget*>()) panels->addAction(panel->toggleViewAction());
-  view->addSeparator();
-  fill_language_menu(*view->addMenu(tr("La&nguage")), [this](const QString& sentence) { say(sentence); });
-}
-
-void MainWindow::make_tools_menu() {
-  QMenu* tools = menuBar()->addMenu(tr("&Tools"));
-  tools_->fill(*tools);
-  tools->addSeparator();
-  add_action(
-      tools, tr("&Put the tool down"), "put_down", Qt::Key_Escape,
-      [this] {
-        if (!view_->holding() && !view_->placing()) tour_->end();
-        put_tool_down();
-      },
-      true);
-  spindle_ = add_action(
-      tools, tr("Run the &spindle"), "spindle", Qt::Key_R,
-      [this] {
-        view_->pointer().set_spindle(spindle_->isChecked());
-        send_pointer();
-      },
-      true);
-  spindle_->setCheckable(true);
-  sound_ = add_action(
-      tools, tr("S&ound"), "sound", QKeySequence("Ctrl+Shift+S"),
-      [this] { sound_control_->set_on(sound_->isChecked()); }, false);
-  sound_control_ = new SoundControl({[this](bool on) {
-                                       sound_->setChecked(on);
-                                       if (on && practice_) practice_->want_sound();
-                                     },
-                                     [this](const QString& sentence) { say(sentence); }},
-                                    this);
-  sound_->setCheckable(true);
-  sound_->setChecked(sound_control_->on());
-  add_action(
-      tools, tr("&Volume and wave form…"), "sound_settings", QKeySequence("Ctrl+Shift+V"),
-      [this] { sound_control_->show_dialog(); }, false);
-}
-
-void MainWindow::make_help_menu() {
-  QMenu* help = menuBar()->addMenu(tr("&Help"));
-  add_action(
-      help, tr("&How to hold a tool"), "help", QKeySequence::HelpContents, [this] { show_help(); }, false);
-  add_action(
-      help, tr("&Tour"), "tour_again", QKeySequence("Ctrl+F1"), [this] { tour_->begin(); }, false);
-  add_action(
-      help, tr("&About Osteon"), "about", {},
-      [this] {
-        QMessageBox::about(
-            this, tr("About Osteon"),
-            tr("Osteon %1 simulates bone surgery. It is for research and teaching. It is not a medical device.")
-                .arg(QApplication::applicationVersion()));
-      },
-      false);
-}
-
-void MainWindow::make_actions() {
-  make_file_menu();
-  make_edit_menu();
-  make_view_menu();
-  make_tools_menu();
-  make_help_menu();
-  for (const QAction* menu : menuBar()->actions()) add_menu_keys(*menu->menu());
-  QToolBar* upper = addToolBar(tr("Actions"));
-  upper->setObjectName("actions");
-  for (const char* name :
-       {"open_case", "save_picture", "undo", "redo", "mark", "overview", "look_tool", "spindle", "put_down"})
-    upper->addAction(findChild<QAction*>(name));
-  upper->widgetForAction(findChild<QAction*>("undo"))->setObjectName("undo_button");
-}
-
 void MainWindow::make_status() {
+  risk_ = new RiskGauge;
+  risk_->setObjectName("risk");
   device_ = new QLabel;
   device_->setObjectName("device");
   position_ = new QLabel;
   position_->setObjectName("position");
   connection_ = new QLabel;
   connection_->setObjectName("connection");
-  for (QLabel* label : {device_, position_, connection_}) statusBar()->addPermanentWidget(label);
+  for (QLabel* label : std::initializer_list<QLabel*>{risk_, device_, position_, connection_})
+    statusBar()->addPermanentWidget(label);
+  risk_->hide();  // the bar has shown it
 }
 
 void MainWindow::enable_room_actions(bool on) {
@@ -327,7 +182,7 @@ void MainWindow::say(const QString& sentence) {
   constexpr int kMargin_px = 60;  // they grow with what they say
   if (!position_->text().isEmpty()) {
     room = width;
-    for (const QLabel* label : {device_, position_, connection_})
+    for (const QLabel* label : std::initializer_list<const QLabel*>{risk_, device_, position_, connection_})
       if (label->isVisible() && !label->text().isEmpty()) room = std::min(room, label->x());
   }
   const QString shown =
@@ -580,6 +435,7 @@ void MainWindow::leave_room() {
   put_tool_down();
   undo_points_.clear();
   view_->show_room(nullptr, {});
+  risk_->set_plan(nullptr);
   room_.reset();
   practice_.reset();
   pointer_.reset();
@@ -733,6 +589,10 @@ void MainWindow::refresh_gauges() {
                            .arg(QLocale().toString(at.x(), 'f', 1), QLocale().toString(at.y(), 'f', 1),
                                 QLocale().toString(at.z(), 'f', 1)));
   }
+  risk_->set_plan(updater != nullptr ? updater->plan() : nullptr);
+  const bool any = updater != nullptr && !updater->states().empty();
+  risk_->show_tip(any ? std::optional(updater->states().front().pose_bone_tool.position_mm) : std::nullopt);
+  if (const QString fault = QString::fromStdString(view_->take_plan_fault()); !fault.isEmpty()) say(fault);
   if (pointer_) device_->setText(pointer_->connected() ? tr("Pointer") : tr("The pointer's device is away"));
   if (hand && !hand->trouble.empty()) say(QString::fromStdString(hand->trouble));
 }
@@ -774,6 +634,14 @@ void MainWindow::showEvent(QShowEvent* event) {
   QTimer::singleShot(0, this, [this] {
     if (!watching_) tour_->begin_once();
   });
+}
+
+void MainWindow::choose_risk_limit() {
+  bool ok = false;
+  const double limit_mm =
+      QInputDialog::getDouble(this, tr("Structures at risk"), tr("Warn when the tip is nearer than, mm"),
+                              risk_->limit_mm(), 0.0, kMostRiskLimit_mm, 1, &ok);
+  if (ok) risk_->set_limit_mm(limit_mm);
 }
 
 void MainWindow::closeEvent(QCloseEvent* event) {

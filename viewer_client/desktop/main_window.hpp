@@ -29,6 +29,7 @@ class ClippingPanel;
 class GaugesPanel;
 class PropertiesPanel;
 class SoundControl;
+class RiskGauge;
 class StartPage;
 class SurgeryToolBar;
 class Tour;
@@ -109,6 +110,7 @@ class MainWindow : public QMainWindow {
   void show_help();
   void refresh_gauges();
   [[nodiscard]] ConnectionState connections();
+  void choose_risk_limit();
   void say(const QString& sentence);
   void enable_room_actions(bool on);
   void set_watching(bool on);
@@ -123,6 +125,7 @@ class MainWindow : public QMainWindow {
   ViewOptions* view_options_ = nullptr;
   SoundControl* sound_control_ = nullptr;
   Tour* tour_ = nullptr;
+  RiskGauge* risk_ = nullptr;
   QLabel *position_ = nullptr, *device_ = nullptr, *connection_ = nullptr;
   std::vector<QAction*> room_actions_;
   QAction *sound_ = nullptr, *spindle_ = nullptr;

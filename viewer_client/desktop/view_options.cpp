@@ -26,13 +26,13 @@ QVariantList numbers_of(const CameraView& view) {
 
 ViewOptions::ViewOptions(BoneView& view, QMenu& menu, const Add& add, Say say, QObject* parent)
     : QObject(parent), view_(view), say_(std::move(say)) {
-  marker_ = add(&menu, tr("Cube of the patient's sides"), "marker", QKeySequence("Ctrl+K"), [this] {
-    QSettings().setValue("view/marker", marker_->isChecked());
-    view_.show_marker(marker_->isChecked());
-  });
-  marker_->setCheckable(true);
-  marker_->setChecked(QSettings().value("view/marker", true).toBool());
-  view_.show_marker(marker_->isChecked());
+  add_switch(menu, add, tr("Cube of the patient's sides"), "marker", QKeySequence("Ctrl+K"),
+             [this](bool on) { view_.show_marker(on); });
+  overlays_ = menu.addMenu(tr("Overlays"));
+  add_switch(*overlays_, add, tr("Planned axes and regions"), "planned", QKeySequence("Ctrl+L"),
+             [this](bool on) { view_.show_planned(on); });
+  add_switch(*overlays_, add, tr("Structures at risk"), "risks", QKeySequence("Ctrl+R"),
+             [this](bool on) { view_.show_risks(on); });
   add_stereo(*menu.addMenu(tr("Stereo picture")), add);
   QMenu& kept = *menu.addMenu(tr("Kept views"));
   add(&kept, tr("Keep this view"), "keep_view", QKeySequence("Ctrl+B"), [this] { keep_view(); });
@@ -44,6 +44,20 @@ ViewOptions::ViewOptions(BoneView& view, QMenu& menu, const Add& add, Say say, Q
                         [this, number] { look(number); }));
   }
   refresh();
+}
+
+QAction* ViewOptions::add_switch(QMenu& menu, const Add& add, const QString& words, const char* name,
+                                 const QKeySequence& keys, std::function<void(bool)> change) {
+  const QString key = QString("view/") + name;
+  auto* made = add(&menu, words, name, keys, [] {});
+  made->setCheckable(true);
+  made->setChecked(QSettings().value(key, true).toBool());
+  change(made->isChecked());
+  connect(made, &QAction::toggled, this, [key, change = std::move(change)](bool on) {
+    QSettings().setValue(key, on);
+    change(on);
+  });
+  return made;
 }
 
 void ViewOptions::add_stereo(QMenu& menu, const Add& add) {

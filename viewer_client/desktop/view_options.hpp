@@ -28,11 +28,16 @@ class ViewOptions : public QObject {
   // `view` and the menu must outlive it.
   ViewOptions(BoneView& view, QMenu& menu, const Add& add, Say say, QObject* parent);
 
+  // The menu of what is drawn over the bone.
+  [[nodiscard]] QMenu* overlays() const { return overlays_; }
   // Kept views are of one bone.
   void show_bone(const QString& title);
 
  private:
   void add_stereo(QMenu& menu, const Add& add);
+  // An action that is on or off, and kept in the settings.
+  QAction* add_switch(QMenu& menu, const Add& add, const QString& words, const char* name, const QKeySequence& keys,
+                      std::function<void(bool)> change);
   void set_stereo(StereoMode mode);
   void keep_view();
   void forget_views();
@@ -43,7 +48,7 @@ class ViewOptions : public QObject {
   BoneView& view_;
   Say say_;
   QString title_;
-  QAction* marker_ = nullptr;
+  QMenu* overlays_ = nullptr;
   std::vector<QAction*> stereo_;  // by StereoMode
   std::vector<QAction*> kept_;
 };

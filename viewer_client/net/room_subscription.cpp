@@ -11,7 +11,9 @@
 #include "common/core/mutex.hpp"
 #include "common/runtime/log.hpp"
 #include "common/wire/convert.hpp"
+#include "common/wire/plan.hpp"
 #include "common/wire/room_client.hpp"
+#include "osteon/v1/plan.grpc.pb.h"
 #include "osteon/v1/room.grpc.pb.h"
 #include "osteon/v1/watch.grpc.pb.h"
 
@@ -164,10 +166,11 @@ struct RoomSubscription::Impl {
   grpc::ClientContext* mesh_context OSTEON_GUARDED_BY(mutex) = nullptr;
   grpc::ClientContext* cutting_context OSTEON_GUARDED_BY(mutex) = nullptr;
   grpc::ClientContext* look_context OSTEON_GUARDED_BY(mutex) = nullptr;
+  grpc::ClientContext* plan_context OSTEON_GUARDED_BY(mutex) = nullptr;
   std::optional<Error> failed OSTEON_GUARDED_BY(mutex);
   std::optional<ViewFrustum> newest_look OSTEON_GUARDED_BY(mutex), said_look OSTEON_GUARDED_BY(mutex);
 
-  std::thread mesh_thread, cutting_thread, look_thread;
+  std::thread mesh_thread, cutting_thread, look_thread, plan_thread;
 
   Impl(RoomSubscriptionOptions o, RenderQueue& i, std::function<bool()> s)
       : options(std::move(o)), render_queue(i), asked_to_stop(std::move(s)) {}
@@ -178,6 +181,12 @@ struct RoomSubscription::Impl {
   void read_mesh();
   void read_cutting();
   void say_looks();
+  void read_plan();
+  template <class Request, class Response>
+  using OnceCall = std::unique_ptr<grpc::ClientReader<Response>> (v1::PlanService::Stub::*)(grpc::ClientContext*,
+                                                                                            const Request&);
+  template <class Reader, class Request, class Response>
+  auto read_once(OnceCall<Request, Response> call) -> std::optional<decltype(std::declval<Reader>().finish())>;
   Result<void> read_mesh_stream();
   void fetch_tools(const std::shared_ptr<grpc::Channel>& channel, std::uint64_t author, KnownTools& known);
   // The same request in the name of the viewer's author.
@@ -411,6 +420,54 @@ void RoomSubscription::Impl::say_looks() {
   }
 }
 
+// [plan thread] Plan and density of a case never change, so each is read once. A lost connection is tried again after
+// the mesh thread has rejoined. Nothing: the server is older, or the subscription ends.
+template <class Reader, class Request, class Response>
+auto RoomSubscription::Impl::read_once(OnceCall<Request, Response> call)
+    -> std::optional<decltype(std::declval<Reader>().finish())> {
+  while (!stopping()) {
+    const auto [channel, author] = line();
+    Request request;
+    request.set_author(author);
+    grpc::ClientContext context;
+    if (!enter(&Impl::plan_context, context)) return {};
+    const auto stub = v1::PlanService::NewStub(channel);
+    const auto reader = (stub.get()->*call)(&context, request);
+    Reader whole;
+    Result<void> outcome;
+    Response message;
+    while (outcome && reader->Read(&message)) outcome = whole.add(message);
+    if (!outcome) context.TryCancel();
+    const grpc::Status ended = reader->Finish();
+    leave(&Impl::plan_context);
+    if (!outcome) return tl::unexpected(outcome.error());
+    if (ended.ok()) return whole.finish();
+    if (ended.error_code() == grpc::StatusCode::UNIMPLEMENTED) return {};  // an older server
+    if (ended.error_code() != grpc::StatusCode::UNAVAILABLE && ended.error_code() != grpc::StatusCode::INVALID_ARGUMENT)
+      return failure(ErrorCode::unavailable, ended.error_message());
+    MutexLock lock(mutex);
+    changed.wait_for(lock, std::chrono::seconds(1), [&]() OSTEON_REQUIRES(mutex) { return ending || failed; });
+    if (failed) return {};
+  }
+  return {};
+}
+
+void RoomSubscription::Impl::read_plan() {
+  if (auto plan = read_once<wire::PlanReader>(&v1::PlanService::Stub::GetPlan)) {
+    if (*plan) (*plan)->bone_mm = room.bounds;
+    if (*plan)
+      render_queue.put_plan(std::move(**plan));
+    else
+      render_queue.put_plan_fault("Structures at risk are not shown: " + plan->error().message);
+  }
+  if (auto density = read_once<wire::DensityReader>(&v1::PlanService::Stub::GetDensity)) {
+    if (*density)
+      render_queue.put_density(std::move(**density));
+    else
+      log::warn("cut faces are painted without density", {{"reason", density->error().message}});
+  }
+}
+
 RoomSubscription::RoomSubscription(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 
 Result<std::unique_ptr<RoomSubscription>> RoomSubscription::start(const RoomSubscriptionOptions& options,
@@ -427,6 +484,7 @@ Result<std::unique_ptr<RoomSubscription>> RoomSubscription::start(const RoomSubs
   impl->mesh_thread = std::thread([&at = *impl] { at.read_mesh(); });
   impl->cutting_thread = std::thread([&at = *impl] { at.read_cutting(); });
   impl->look_thread = std::thread([&at = *impl] { at.say_looks(); });
+  impl->plan_thread = std::thread([&at = *impl] { at.read_plan(); });
   return std::unique_ptr<RoomSubscription>(new RoomSubscription(std::move(impl)));
 }
 
@@ -437,11 +495,13 @@ RoomSubscription::~RoomSubscription() {
     if (impl_->mesh_context != nullptr) impl_->mesh_context->TryCancel();
     if (impl_->cutting_context != nullptr) impl_->cutting_context->TryCancel();
     if (impl_->look_context != nullptr) impl_->look_context->TryCancel();
+    if (impl_->plan_context != nullptr) impl_->plan_context->TryCancel();
     impl_->changed.notify_all();
   }
   impl_->mesh_thread.join();
   impl_->cutting_thread.join();
   impl_->look_thread.join();
+  impl_->plan_thread.join();
 }
 
 const WatchedRoom& RoomSubscription::room() const { return impl_->room; }

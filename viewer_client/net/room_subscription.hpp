@@ -1,4 +1,5 @@
-// A viewer's connection to the server. It joins the room and fills a RenderQueue from the room's two streams.
+// A viewer's connection to the server. It joins the room and fills a RenderQueue from the room's two streams and its
+// plan.
 #pragma once
 #include <chrono>
 #include <functional>
@@ -35,7 +36,8 @@ struct WatchedRoom {
   Box bounds;
 };
 
-// From start() to the destructor it has three threads: one reader for each stream, and one that sends the view.
+// From start() to the destructor it has four threads: one reader for each stream, one that sends the view, and one that
+// reads the plan and ends.
 class RoomSubscription {
  public:
   // Joins first. Errors: unavailable, unsupported, cancelled; each with one sentence. `render_queue` must outlive the

@@ -12,6 +12,7 @@
 #include <vtkUnsignedCharArray.h>
 
 #include <cstring>
+#include <vector>
 
 namespace osteon {
 
@@ -46,21 +47,27 @@ vtkSmartPointer<vtkPolyData> poly_data(std::span<const std::array<float, 3>> pos
                                        std::span<const std::uint8_t> marked,
                                        std::span<const std::array<std::uint32_t, 3>> triangles,
                                        std::span<const Colour> palette) {
+  std::vector<Colour> colours(marked.size());
+  for (std::size_t i = 0; i < marked.size(); ++i) colours[i] = palette[marked[i]];
+  return poly_data(positions_mm, normals, colours, triangles);
+}
+
+vtkSmartPointer<vtkPolyData> poly_data(std::span<const std::array<float, 3>> positions_mm,
+                                       std::span<const std::array<float, 3>> normals, std::span<const Colour> colours,
+                                       std::span<const std::array<std::uint32_t, 3>> triangles) {
   vtkNew<vtkPoints> points;
   points->SetData(vectors(positions_mm));
 
-  vtkNew<vtkUnsignedCharArray> colours;
-  colours->SetNumberOfComponents(3);
-  colours->SetNumberOfTuples(static_cast<vtkIdType>(marked.size()));
-  for (std::size_t i = 0; i < marked.size(); ++i) {
-    std::memcpy(colours->GetPointer(static_cast<vtkIdType>(3 * i)), palette[marked[i]].data(), 3);
-  }
+  vtkNew<vtkUnsignedCharArray> bytes;
+  bytes->SetNumberOfComponents(3);
+  bytes->SetNumberOfTuples(static_cast<vtkIdType>(colours.size()));
+  if (!colours.empty()) std::memcpy(bytes->GetPointer(0), colours.data(), 3 * colours.size());
 
   auto data = vtkSmartPointer<vtkPolyData>::New();
   data->SetPoints(points);
   data->SetPolys(cells_of(triangles));
   data->GetPointData()->SetNormals(vectors(normals));
-  data->GetPointData()->SetScalars(colours);
+  data->GetPointData()->SetScalars(bytes);
   return data;
 }
 

@@ -20,6 +20,12 @@ using Colour = std::array<std::uint8_t, 3>;  // red, green, blue
                                                      std::span<const std::array<std::uint32_t, 3>> triangles,
                                                      std::span<const Colour> palette);
 
+// The same with a colour for each position.
+[[nodiscard]] vtkSmartPointer<vtkPolyData> poly_data(std::span<const std::array<float, 3>> positions_mm,
+                                                     std::span<const std::array<float, 3>> normals,
+                                                     std::span<const Colour> colours,
+                                                     std::span<const std::array<std::uint32_t, 3>> triangles);
+
 [[nodiscard]] vtkSmartPointer<vtkActor> actor_of(vtkPolyData* data);
 
 }  // namespace osteon

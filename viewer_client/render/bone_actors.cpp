@@ -12,9 +12,12 @@
 #include <vtkRenderer.h>
 #include <vtkSmartPointer.h>
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <map>
+#include <utility>
 #include <vector>
 
 #include "viewer_client/render/actors.hpp"
@@ -22,6 +25,8 @@
 namespace osteon {
 
 namespace {
+
+using Vec3f = Eigen::Vector3f;
 
 constexpr Colour kBone{241, 226, 196};     // dry ivory
 constexpr Colour kCutBone{219, 143, 117};  // fresh bone with marrow in it
@@ -31,13 +36,70 @@ constexpr Colour kCutEnamel{236, 214, 232};
 // sawn-off pieces, in turn
 constexpr std::array<Colour, 3> kPieces{{{214, 226, 200}, {200, 214, 236}, {236, 206, 214}}};
 
-vtkSmartPointer<vtkPolyData> coloured(const Mesh& mesh, BodyId body) {
+// Cut faces by density. Between the densities of cancellous bone and of cortex the colours are mixed.
+const Vec3f kCutCortex{240.0f, 214.0f, 184.0f};  // pale
+const Vec3f kStruts{226.0f, 168.0f, 134.0f};     // trabeculae
+const Vec3f kPores{122.0f, 44.0f, 38.0f};        // marrow between them
+constexpr float kCancellous_g_cm3 = 0.7f, kCortex_g_cm3 = 1.4f;
+constexpr float kPore_mm = 1.3f;      // distance of pores [A]
+constexpr float kSolid_g_cm3 = 1.9f;  // without pores
+constexpr float kPoreEdge = 0.04f;    // of the texture's values, over which the edge of a pore is soft
+
+float smooth(float from, float to, float value) {
+  const float t = std::clamp((value - from) / (to - from), 0.0f, 1.0f);
+  return t * t * (3.0f - 2.0f * t);
+}
+
+// A number from 0 to 1 that depends only on the lattice point.
+float hashed(int x, int y, int z) {
+  std::uint32_t h = static_cast<std::uint32_t>(x) * 0x8da6b343u ^ static_cast<std::uint32_t>(y) * 0xd8163841u ^
+                    static_cast<std::uint32_t>(z) * 0xcb1ab31fu;
+  h = (h ^ h >> 13) * 0x5bd1e995u;
+  return static_cast<float>((h ^ h >> 15) & 0xffffu) / 65535.0f;
+}
+
+// Smooth values from 0 to 1 about lattice points in the bone's frame, so that the texture stays where it is.
+float texture_at(const std::array<float, 3>& at_mm) {
+  std::array<int, 3> first{};
+  std::array<float, 3> t{};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const float at = at_mm[axis] / kPore_mm;
+    first[axis] = static_cast<int>(std::floor(at));
+    t[axis] = smooth(0.0f, 1.0f, at - static_cast<float>(first[axis]));
+  }
+  float sum = 0.0f;
+  for (int corner = 0; corner < 8; ++corner) {
+    float weight = 1.0f;
+    for (std::size_t axis = 0; axis < 3; ++axis) weight *= (corner >> axis & 1) != 0 ? t[axis] : 1.0f - t[axis];
+    sum += weight * hashed(first[0] + (corner & 1), first[1] + (corner >> 1 & 1), first[2] + (corner >> 2 & 1));
+  }
+  return sum;
+}
+
+Colour cut_colour(const std::array<float, 3>& at_mm, const DensityGrid& density) {
+  const auto g_cm3 = static_cast<float>(density.g_cm3(Vec3(at_mm[0], at_mm[1], at_mm[2])));
+  // The share of struts follows from the density of solid bone. They are where the texture is near its middle value, so
+  // they form a net. Most values are near the middle, hence the shape of `width`.
+  const float share = std::clamp(g_cm3 / kSolid_g_cm3, 0.0f, 1.0f), squared = share * share;
+  const float width = 0.2f * share + 0.35f * squared * squared;
+  const float pore = smooth(width - kPoreEdge, width + kPoreEdge, std::abs(texture_at(at_mm) - 0.5f));
+  const float cortex = smooth(kCancellous_g_cm3, kCortex_g_cm3, g_cm3);
+  const Vec3f cancellous = kStruts + pore * (kPores - kStruts);
+  const Vec3f mixed = cancellous + cortex * (kCutCortex - cancellous);
+  return {static_cast<std::uint8_t>(mixed.x()), static_cast<std::uint8_t>(mixed.y()),
+          static_cast<std::uint8_t>(mixed.z())};
+}
+
+vtkSmartPointer<vtkPolyData> coloured(const Mesh& mesh, BodyId body, const DensityGrid* density) {
   const Colour& whole = body == BodyId{0} ? kBone : kPieces[body.value % kPieces.size()];
   const std::array palette{whole, kCutBone, kMetal, kMetal, kEnamel, kCutEnamel};
   std::vector<std::uint8_t> looks = mesh.cut_face;
   for (std::size_t v = 0; v < mesh.tissue.size(); ++v)
     if (mesh.tissue[v] != Tissue::none) looks[v] |= mesh.tissue[v] == Tissue::metal ? 2 : 4;
-  return poly_data(mesh.positions_mm, mesh.normals, looks, mesh.triangles, palette);
+  std::vector<Colour> colours(looks.size());
+  for (std::size_t v = 0; v < looks.size(); ++v)
+    colours[v] = looks[v] == 1 && density != nullptr ? cut_colour(mesh.positions_mm[v], *density) : palette[looks[v]];
+  return poly_data(mesh.positions_mm, mesh.normals, colours, mesh.triangles);
 }
 
 vtkSmartPointer<vtkActor> bone_actor(vtkPolyData* data) {
@@ -59,6 +121,7 @@ struct BoneActors::Impl {
   vtkRenderer& renderer;
   std::map<RegionKey, vtkSmartPointer<vtkActor>> regions;
   vtkNew<vtkPlaneCollection> planes;
+  std::shared_ptr<const DensityGrid> density;  // shared with whoever received it; null: not known
 
   void clip(vtkActor& actor) const {
     const bool open = planes->GetNumberOfItems() > 0;
@@ -68,7 +131,7 @@ struct BoneActors::Impl {
   }
 };
 
-BoneActors::BoneActors(vtkRenderer& renderer) : impl_(new Impl{renderer, {}, {}}) {}
+BoneActors::BoneActors(vtkRenderer& renderer) : impl_(new Impl{renderer, {}, {}, {}}) {}
 
 BoneActors::~BoneActors() = default;
 
@@ -81,7 +144,7 @@ bool BoneActors::show(const RegionKey& region, const Mesh& mesh) {
     }
     return false;
   }
-  const auto data = coloured(mesh, region.body);
+  const auto data = coloured(mesh, region.body, impl_->density.get());
   if (held != impl_->regions.end()) {
     static_cast<vtkPolyDataMapper*>(held->second->GetMapper())->SetInputData(data);
     return false;
@@ -91,6 +154,8 @@ bool BoneActors::show(const RegionKey& region, const Mesh& mesh) {
   impl_->regions.emplace(region, actor);
   return true;
 }
+
+void BoneActors::set_density(std::shared_ptr<const DensityGrid> density) { impl_->density = std::move(density); }
 
 void BoneActors::clip(const Clipping& visible) {
   impl_->planes->RemoveAllItems();

@@ -4,6 +4,7 @@
 #include <memory>
 #include <optional>
 
+#include "common/surface/density_grid.hpp"
 #include "viewer_client/scene/clipping.hpp"
 #include "viewer_client/scene/surface_scene.hpp"
 
@@ -20,6 +21,9 @@ class BoneActors {
   // The region's whole mesh, bone frame. An empty mesh removes the region from the picture. Returns true if the region
   // is new; it is then drawn after the next add().
   [[nodiscard]] bool show(const RegionKey& region, const Mesh& mesh);
+
+  // From the next show() on, cut faces are painted by density: cortex pale, cancellous bone dark between its struts.
+  void set_density(std::shared_ptr<const DensityGrid> density);
 
   // Draws only this part of each region, also of those that come later.
   void clip(const Clipping& visible);

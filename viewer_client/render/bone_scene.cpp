@@ -13,6 +13,7 @@
 #include "viewer_client/render/lighting.hpp"
 #include "viewer_client/render/orientation_marker.hpp"
 #include "viewer_client/render/people_overlay.hpp"
+#include "viewer_client/render/plan_actors.hpp"
 #include "viewer_client/render/status_text.hpp"
 #include "viewer_client/render/tool_actors.hpp"
 #include "viewer_client/render/view_of_camera.hpp"
@@ -26,6 +27,7 @@ struct BoneScene::Impl {
   ToolActors tools{*renderer};
   StatusText status{*renderer};
   std::optional<PeopleOverlay> people;
+  std::optional<PlanActors> plan;
   OrientationMarker marker{window};
   Stereo stereo{window, *renderer};
 
@@ -53,9 +55,11 @@ BoneScene::Impl::Impl(vtkRenderWindow& on) : window(on) {
     culler->SetSortingStyleToFrontToBack();
   }
   people.emplace(*renderer, window, [this](const Vec3& point_mm) { return bone.normal_at(point_mm); });
+  plan.emplace(*renderer, window);
 }
 
 BoneScene::Impl::~Impl() {
+  plan.reset();
   people.reset();
   window.RemoveRenderer(renderer);
 }
@@ -76,6 +80,8 @@ BoneScene::~BoneScene() = default;
 void BoneScene::show_region(const RegionKey& region, const Mesh& mesh) {
   if (impl_->bone.show(region, mesh)) impl_->add_in_order();
 }
+
+void BoneScene::set_density(std::shared_ptr<const DensityGrid> density) { impl_->bone.set_density(std::move(density)); }
 
 void BoneScene::show_tools(std::span<const CuttingState> states) {
   if (impl_->tools.show_tools(states)) impl_->add_in_order();
@@ -115,6 +121,12 @@ void BoneScene::look(const CameraView& view) { set_view(*impl_->renderer->GetAct
 
 CameraView BoneScene::camera() const { return view_of(*impl_->renderer->GetActiveCamera()); }
 
+void BoneScene::show_plan(const SurgicalPlan& plan) { impl_->plan->show(plan); }
+
+void BoneScene::show_planned(bool on) { impl_->plan->set_planned(on); }
+
+void BoneScene::show_risks(bool on) { impl_->plan->set_risks(on); }
+
 void BoneScene::show_marker(bool on) { impl_->marker.show(on); }
 
 void BoneScene::clip(const Clipping& visible) { impl_->bone.clip(visible); }
@@ -132,6 +144,7 @@ void BoneScene::draw() {
   impl_->people->show_words(impl_->said, impl_->holding, impl_->hint);
   impl_->people->show_stroke(impl_->stroke_mm);
   impl_->people->place();
+  impl_->plan->place(stereo() == StereoMode::side_by_side);
   const CameraView view = camera();
   impl_->marker.follow(view);
   impl_->stereo.place(view);

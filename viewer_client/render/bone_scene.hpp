@@ -12,6 +12,8 @@
 
 #include "common/core/result.hpp"
 #include "common/mechanics/cutting_state.hpp"
+#include "common/surface/density_grid.hpp"
+#include "common/surface/surgical_plan.hpp"
 #include "common/tools/annotation.hpp"
 #include "common/tools/scene_item.hpp"
 #include "viewer_client/render/image.hpp"
@@ -32,6 +34,8 @@ class BoneScene {
 
   // The region's whole mesh, bone frame. An empty mesh removes the region from the picture.
   void show_region(const RegionKey& region, const Mesh& mesh);
+  // Paints the cut faces of regions that are shown from now on by density. Shared with whoever else reads it.
+  void set_density(std::shared_ptr<const DensityGrid> density);
   // The tools of the room. Tools that are not in the list vanish. A translucent ghost shows the pose of the user's hand
   // where it differs from the tool.
   void show_tools(std::span<const CuttingState> states);
@@ -56,6 +60,13 @@ class BoneScene {
 
   void look(const CameraView& view);
   [[nodiscard]] CameraView camera() const;
+
+  // What is planned, and the structures at risk. Nothing of it is drawn before show_planned() and show_risks().
+  void show_plan(const SurgicalPlan& plan);
+  // Axes, planes and regions, through the bone too.
+  void show_planned(bool on);
+  // Structures at risk: translucent before the bone, and fainter behind it.
+  void show_risks(bool on);
 
   // The cube that names the patient's sides. It is off at first.
   void show_marker(bool on);

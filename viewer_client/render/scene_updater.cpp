@@ -35,6 +35,17 @@ bool SceneUpdater::update(bool tools_shown) {
       changed = true;
     }
   }
+  if (!delivery.plan_fault.empty()) plan_fault_ = std::move(delivery.plan_fault);
+  if (delivery.plan) {
+    plan_ = std::move(delivery.plan);
+    scene_->show_plan(*plan_);
+    changed = true;
+  }
+  if (delivery.density) {
+    scene_->set_density(std::move(delivery.density));
+    surface_.repaint_cuts();
+    changed = (complete_ && rebuild()) || changed;
+  }
   if (delivery.snapshot_begun) {
     surface_.begin_snapshot();
     complete_ = false;

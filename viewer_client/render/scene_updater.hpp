@@ -2,8 +2,10 @@
 // its owner can tell progress and log when an event was shown.
 #pragma once
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <span>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -23,6 +25,11 @@ class SceneUpdater {
   // Takes what waits, and rebuilds the regions that changed. True if the picture changed. A change of tools counts only
   // if `tools_shown`.
   [[nodiscard]] bool update(bool tools_shown);
+
+  // What is planned, and the structures at risk. Null: not yet received, or there is nothing.
+  [[nodiscard]] const std::shared_ptr<const SurgicalPlan>& plan() const { return plan_; }
+  // A sentence why there is no plan, once. Empty: none.
+  [[nodiscard]] std::string take_plan_fault() { return std::exchange(plan_fault_, {}); }
 
   [[nodiscard]] std::span<const CuttingState> states() const { return states_; }
   [[nodiscard]] const std::vector<SceneItem>& items() const { return items_; }
@@ -49,6 +56,8 @@ class SceneUpdater {
   std::vector<CuttingState> states_;
   std::vector<SceneItem> items_;
   std::vector<BodyId> bodies_;
+  std::shared_ptr<const SurgicalPlan> plan_;  // shared with the scene and with distances
+  std::string plan_fault_;
   bool complete_ = false;
   std::size_t snapshot_blocks_ = 0, snapshot_received_ = 0;
   RoomSeq received_seq_;

@@ -42,6 +42,36 @@ void RenderQueue::put_tool(Tool tool) {
   next_.tools.push_back(std::move(tool));
 }
 
+void RenderQueue::put_plan(SurgicalPlan plan) {
+  bool first = false;
+  {
+    const MutexLock lock(mutex_);
+    next_.plan = std::make_shared<const SurgicalPlan>(std::move(plan));
+    first = !std::exchange(waiting_, true);
+  }
+  announce(first);
+}
+
+void RenderQueue::put_density(DensityGrid density) {
+  bool first = false;
+  {
+    const MutexLock lock(mutex_);
+    next_.density = std::make_shared<const DensityGrid>(std::move(density));
+    first = !std::exchange(waiting_, true);
+  }
+  announce(first);
+}
+
+void RenderQueue::put_plan_fault(std::string sentence) {
+  bool first = false;
+  {
+    const MutexLock lock(mutex_);
+    next_.plan_fault = std::move(sentence);
+    first = !std::exchange(waiting_, true);
+  }
+  announce(first);
+}
+
 void RenderQueue::put_states(std::vector<CuttingState> states, std::vector<SceneItem> items,
                              std::vector<BodyId> bodies) {
   bool first = false;

@@ -5,12 +5,16 @@
 #include <cstdint>
 #include <functional>
 #include <map>
+#include <memory>
+#include <string>
 #include <utility>
 #include <vector>
 
 #include "common/core/id.hpp"
 #include "common/core/mutex.hpp"
 #include "common/mechanics/cutting_state.hpp"
+#include "common/surface/density_grid.hpp"
+#include "common/surface/surgical_plan.hpp"
 #include "common/tools/scene_item.hpp"
 #include "viewer_client/scene/surface_scene.hpp"
 
@@ -36,6 +40,11 @@ struct Delivery {
   std::vector<SceneItem> items;  // with any_states
   std::vector<BodyId> bodies;    // with any_states
   std::vector<Tool> tools;       // that this program did not have
+  // What is planned, and the structures at risk. They come once. Null: they did not come since the last take(). Shared:
+  // the picture and whoever measures distances read it.
+  std::shared_ptr<const SurgicalPlan> plan;
+  std::shared_ptr<const DensityGrid> density;  // of the imported bone; it comes once too
+  std::string plan_fault;                      // a sentence: why there is no plan
 };
 
 // Any thread may call any function. One mutex, held only for a few moves.
@@ -47,6 +56,9 @@ class RenderQueue {
                 std::uint32_t snapshot_blocks, std::int64_t received_mono_ns);
   void put_states(std::vector<CuttingState> states, std::vector<SceneItem> items = {}, std::vector<BodyId> bodies = {});
   void put_tool(Tool tool);
+  void put_plan(SurgicalPlan plan);
+  void put_density(DensityGrid density);
+  void put_plan_fault(std::string sentence);
 
   // Called by the thread that put data, once until the next take(). It must return at once. Call this before data
   // comes.

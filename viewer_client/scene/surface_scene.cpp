@@ -106,6 +106,14 @@ std::vector<RegionKey> SurfaceScene::take_dirty() {
   return keys;
 }
 
+void SurfaceScene::repaint_cuts() {
+  for (const auto& [key, blocks] : regions_)
+    if (std::ranges::any_of(blocks, [](const auto& entry) {
+          return std::ranges::find(entry.second.mesh.cut_face, 1) != entry.second.mesh.cut_face.end();
+        }))
+      dirty_.insert(key);
+}
+
 Mesh SurfaceScene::region_mesh(const RegionKey& region) const {
   Mesh whole;
   const auto found = regions_.find(region);

@@ -55,6 +55,8 @@ class SurfaceScene {
 
   // Regions changed since the last call, each once, in order.
   [[nodiscard]] std::vector<RegionKey> take_dirty();
+  // Every region with a cut face counts as changed.
+  void repaint_cuts();
   // All triangles of a region as one mesh, blocks in the order of their keys. Empty if nothing is left.
   [[nodiscard]] Mesh region_mesh(const RegionKey& region) const;
 

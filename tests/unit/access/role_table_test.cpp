@@ -46,7 +46,8 @@ Names allowed(Role role) {
   }
   if (role >= Role::observer)
     names.insert({room + "Join", room + "GetStatus", room + "GetCase", room + "ListTools", room + "GetTool",
-                  watch + "WatchMesh", watch + "WatchCutting", watch + "LookFrom", people + "WatchPeople"});
+                  watch + "WatchMesh", watch + "WatchCutting", watch + "LookFrom", people + "WatchPeople",
+                  "/osteon.v1.PlanService/GetPlan", "/osteon.v1.PlanService/GetDensity"});
   if (role >= Role::trainee)
     names.insert({"/osteon.v1.CuttingService/Session", room + "AddTool", room + "Undo", room + "Redo", room + "Mark",
                   room + "SetSceneItem", room + "RemoveSceneItem", people + "Say"});

@@ -137,6 +137,26 @@ TEST(Seams, ThreeLevelsMeet) {
   EXPECT_EQ(result.euler, 0);
 }
 
+// Beside a seam the finer block follows the coarser contour, which lies below the imported surface where that is round.
+TEST(Seams, OnlyTheCutIsACutFace) {
+  for (const int level : {1, 2}) {
+    Drawn drawn = ball(6.0, 0.8);
+    const Vec3 from(-2, 0, 5), to(2, 1, 5);
+    drawn.cut(cut_at_level("burr-round-5", level, from, to, {0, 0, -1}));
+    int on_cut = 0, off_cut = 0;
+    for (const Mesh& mesh : drawn.meshes())
+      for (std::size_t v = 0; v < mesh.positions_mm.size(); ++v) {
+        const auto& p = mesh.positions_mm[v];
+        // The burr is a ball of 2.5 mm radius, whose tip is its lowest point.
+        const Vec3 centre = Vec3(p[0], p[1], p[2]) - Vec3(0, 0, 2.5) - from, along = to - from;
+        const double away = (centre - std::clamp(centre.dot(along) / along.squaredNorm(), 0.0, 1.0) * along).norm();
+        if (mesh.cut_face[v] != 0) ++(away < 2.5 + 0.8 ? on_cut : off_cut);
+      }
+    EXPECT_GT(on_cut, 100) << level;
+    EXPECT_EQ(off_cut, 0) << level;
+  }
+}
+
 // A surface is closed whatever was cut.
 TEST(Seams, RandomCutsOfAllLevelsLeaveAClosedSurface) {
   std::mt19937 random(5);

@@ -3,9 +3,11 @@
 
 #include <cmath>
 #include <cstdlib>
+#include <memory>
 #include <numbers>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "common/surface/block_source.hpp"
 #include "common/volume/cut_field.hpp"
@@ -118,6 +120,142 @@ TEST_F(BonePicture, MetalAndEnamelHaveColoursOfTheirOwn) {
   EXPECT_GT(cut_bone.x() / cut_bone.y(), 1.25 * bone.x() / bone.y());
   EXPECT_GT((cut_enamel - cut_bone).norm(), 40.0);
   EXPECT_GT((cut_enamel - enamel).norm(), 12.0);
+}
+
+// Density from `left` to `right` of the bone's middle plane.
+std::shared_ptr<const DensityGrid> two_halves(double left_g_cm3, double right_g_cm3) {
+  auto grid = std::make_shared<DensityGrid>(1.0);
+  for (int x = -3; x < 3; ++x)
+    for (int y = -3; y < 3; ++y)
+      for (int z = -3; z < 3; ++z) {
+        DensityLeaf leaf;
+        leaf.fill(static_cast<std::uint8_t>(std::lround((x < 0 ? left_g_cm3 : right_g_cm3) / kDensityStep_g_cm3)));
+        grid->add({x, y, z}, leaf);
+      }
+  return grid;
+}
+
+// Mean brightness of green over a part of the ball's front, and how rough it is: the light changes evenly over a ball,
+// so what is left of the second differences is texture.
+struct Texture {
+  double mean = 0, roughness = 0;
+};
+Texture texture_of_front(const Image& image, int from_x, int to_x) {
+  Texture look;
+  int count = 0;
+  for (int x = from_x; x < to_x; ++x)
+    for (int y = kHeight / 2 - 25; y < kHeight / 2 + 25; ++y, ++count) {
+      const double green = image.at(x, y)[1];
+      look.mean += green;
+      look.roughness += std::abs(2.0 * green - image.at(x, y - 3)[1] - image.at(x, y + 3)[1]);
+    }
+  return {look.mean / count, look.roughness / count};
+}
+
+TEST_F(BonePicture, ACutFaceIsPaleInCortexAndPorousInCancellousBone) {
+  const int middle = kWidth / 2;
+  const auto drawn_with = [&](double left_g_cm3, double right_g_cm3) {
+    window_->scene().set_density(two_halves(left_g_cm3, right_g_cm3));
+    window_->scene().show_region(kHere, sphere_mesh(Vec3::Zero(), 15.0, 1, 120));
+    return drawn();
+  };
+  const Image image = drawn_with(1.9, 0.4);
+  if (const char* folder = std::getenv("OSTEON_PICTURES")) {
+    ASSERT_TRUE(window_->scene().save_png(std::string(folder) + "/cut-faces.png"));
+  }
+  const Texture cortex = texture_of_front(image, middle - 28, middle - 6),
+                spongy = texture_of_front(image, middle + 6, middle + 28);
+  EXPECT_GT(cortex.mean, spongy.mean + 40.0);
+  EXPECT_GT(spongy.roughness, 3.0 * cortex.roughness);
+  // The less bone, the more pores.
+  double brighter = 0.0;
+  for (const double g_cm3 : {0.1, 0.3, 0.5, 0.8, 1.1, 1.6}) {
+    const Texture now = texture_of_front(drawn_with(g_cm3, g_cm3), middle - 28, middle + 28);
+    EXPECT_GT(now.mean, brighter) << g_cm3;
+    brighter = now.mean;
+  }
+}
+
+// Pores stay where they are in the bone, whatever the triangles are.
+TEST_F(BonePicture, TheTextureOfACutIsFixedInTheBone) {
+  window_->scene().set_density(two_halves(0.5, 0.5));
+  window_->scene().show_region(kHere, sphere_mesh(Vec3::Zero(), 15.0, 1, 120));
+  const Image one = drawn();
+  window_->scene().show_region(kHere, sphere_mesh(Vec3::Zero(), 15.0, 1, 150));
+  const Image other = drawn();
+  double same = 0.0, shifted = 0.0;
+  for (int x = kWidth / 2 - 25; x < kWidth / 2 + 25; ++x)
+    for (int y = kHeight / 2 - 25; y < kHeight / 2 + 25; ++y) {
+      same += std::abs(one.at(x, y)[1] - other.at(x, y)[1]);
+      shifted += std::abs(one.at(x, y)[1] - other.at(x + 7, y)[1]);
+    }
+  EXPECT_LT(same, 0.4 * shifted);
+}
+
+// What is not cut has no texture, and metal keeps its colour.
+TEST_F(BonePicture, DensityPaintsOnlyCutBone) {
+  window_->scene().show_region(kHere, sphere_mesh(Vec3::Zero(), 15.0, 0));
+  const Image whole = drawn();
+  window_->scene().set_density(two_halves(0.4, 0.4));
+  window_->scene().show_region(kHere, sphere_mesh(Vec3::Zero(), 15.0, 0));
+  EXPECT_EQ(differing_pixels(drawn(), whole), 0);
+}
+
+// The bone around a groove, whose blocks are finer than the bone's, keeps its own colour: to a cell of the bone beside
+// the groove, no pixel has that of the cut.
+TEST_F(BonePicture, NoPixelOffTheCutHasItsColour) {
+  constexpr double kPitch = 0.8;
+  for (const int level : {1, 2}) {
+    CutField field(test::make_bone(
+                       {Vec3::Constant(-15), Vec3::Constant(15)}, kPitch, [](const Vec3& p) { return p.norm() - 12.0; },
+                       [](const Vec3&) { return 1.9; }),
+                   BodyId{});
+    SurfaceBlocks blocks{BodyId{}};
+    const Vec3 from(-3, -11, 0), to(3, -11, 1), axis(0, 1, 0);
+    Cut groove = test::straight_cut(*find_tool("burr-round-5"), from, to, axis);
+    groove.level = level;
+    (void)blocks.touch(level, field.apply(groove).changed_leaves);
+    std::vector<BlockKey> keys = blocks.fine_blocks();
+    for (int x = -2; x <= 1; ++x)
+      for (int y = -2; y <= 1; ++y)
+        for (int z = -2; z <= 1; ++z) keys.push_back({{}, 0, {x, y, z}});
+    int region = 0;
+    for (const BlockKey& key : keys) {
+      BlockSamples samples;
+      gather_block(field, blocks, key, kPitch, samples);
+      const auto mesh = decode_block(key, encode_block(samples), level_pitch_mm(kPitch, key.level));
+      ASSERT_TRUE(mesh);
+      window_->scene().show_region({BodyId{0}, 0, {region++, 0, 0}}, *mesh);
+    }
+    int on_cut = 0, off_cut = 0;
+    for (const Vec3& eye : {Vec3(0, -90, 0), Vec3(50, -70, 20), Vec3(-40, -70, -50)}) {
+      CameraView view = from_front(90.0);
+      view.eye_mm = eye;
+      window_->scene().look(view);
+      const Image image = drawn();
+      for (int x = 0; x < kWidth; x += 2)
+        for (int y = 0; y < kHeight; y += 2) {
+          const auto& [r, g, b] = image.at(x, y);
+          // Bone has 1.07 times as much red as green, a cut 1.53 times.
+          if (r < 60 || r < 1.25 * g) continue;
+          // At an edge a pixel may show what the next one is at.
+          double least = 1e9;
+          for (int dx = -1; dx <= 1; ++dx)
+            for (int dy = -1; dy <= 1; ++dy) {
+              const auto at = window_->scene().surface_at(x + dx, y + dy);
+              if (!at) continue;
+              const Vec3 centre = *at + 2.5 * axis - from, along = to - from;
+              least = std::min(least,
+                               (centre - std::clamp(centre.dot(along) / along.squaredNorm(), 0.0, 1.0) * along).norm());
+            }
+          ++(least < 2.5 + kPitch ? on_cut : off_cut);
+          if (least >= 2.5 + kPitch)
+            ADD_FAILURE() << x << ", " << y << ": " << least << " mm, red " << r << " of " << g;
+        }
+    }
+    EXPECT_GT(on_cut, 300) << level;
+    EXPECT_EQ(off_cut, 0) << level;
+  }
 }
 
 TEST_F(BonePicture, DoesNotDependOnTheOrderOfArrival) {

@@ -8,6 +8,7 @@
 
 #include "picture.hpp"
 #include "synthetic.hpp"
+#include "viewer_client/render/plan_actors.hpp"
 
 namespace osteon {
 namespace {
@@ -142,6 +143,78 @@ TEST_F(ScenePicture, AWindowWithoutQuadBuffersSaysSo) {
   EXPECT_FALSE(scene().set_stereo(StereoMode::quad_buffer));
   EXPECT_EQ(scene().stereo(), StereoMode::off);
   EXPECT_EQ(differing_pixels(drawn(), bare_), 0);
+}
+
+// A ball of a structure, half of it in the bone, and an axis through both.
+SurgicalPlan plan_with(StructureKind kind, const Vec3& centre_mm) {
+  const Mesh ball = sphere_mesh(centre_mm, 5.0, 0);
+  SurgicalPlan plan;
+  plan.structures = {{"ball", kind, 0.5, {ball.positions_mm, ball.triangles, {}}}};
+  return plan;
+}
+
+TEST_F(ScenePicture, StructuresAtRiskAreSeenBeforeTheBoneAndFainterBehindIt) {
+  const auto changed_at_middle = [&] {
+    const Vec3 now = colour(drawn(), kWidth / 2, kHeight / 2);
+    return (now - colour(bare_, kWidth / 2, kHeight / 2)).norm();
+  };
+  scene().show_plan(plan_with(StructureKind::vessel, Vec3(0, -22, 0)));
+  EXPECT_EQ(differing_pixels(drawn(), bare_), 0) << "off at first";
+  scene().show_risks(true);
+  const double before = changed_at_middle();
+  EXPECT_GT(before, 60.0);
+  // Translucent: the bone's colour still counts.
+  const Vec3 over_bone = colour(drawn(), kWidth / 2, kHeight / 2);
+  scene().show_region({BodyId{0}, 0, {0, 0, 0}}, {});
+  EXPECT_GT((over_bone - colour(drawn(), kWidth / 2, kHeight / 2)).norm(), 20.0);
+  scene().show_region({BodyId{0}, 0, {0, 0, 0}}, sphere_mesh(Vec3::Zero(), kRadius_mm, 0));
+  scene().show_plan(plan_with(StructureKind::vessel, Vec3(0, 0, 0)));
+  const double behind = changed_at_middle();
+  EXPECT_GT(behind, 8.0);
+  EXPECT_LT(behind, 0.6 * before);
+  scene().show_planned(true);
+  scene().show_risks(false);
+  EXPECT_EQ(differing_pixels(drawn(), bare_), 0) << "a structure is not planned";
+}
+
+TEST_F(ScenePicture, APlannedAxisIsALineThroughTheBone) {
+  SurgicalPlan plan;
+  plan.axes = {{"axis", Vec3(4, 0, 0), Vec3::UnitZ()}};
+  scene().show_plan(plan);
+  scene().show_planned(true);
+  const Image image = drawn();
+  const auto [x, y] = seen(Vec3(4, 0, 0));
+  int columns = 0;
+  for (int i = 0; i < kWidth; ++i) columns += image.at(i, y) != bare_.at(i, y) ? 1 : 0;
+  EXPECT_GE(columns, 2);
+  EXPECT_LE(columns, 6);
+  EXPECT_NE(image.at(x, y), bare_.at(x, y));
+  scene().show_planned(false);
+  EXPECT_EQ(differing_pixels(drawn(), bare_), 0);
+}
+
+// Viewing the colours as a person without one kind of cones does (Viénot 1999), every two kinds still differ.
+TEST(StructureColours, DifferForColourBlindPeople) {
+  const auto linear = [](std::uint32_t colour, int shift) { return std::pow((colour >> shift & 255) / 255.0, 2.2); };
+  Eigen::Matrix3d to_cones;
+  to_cones << 17.8824, 43.5161, 4.11935, 3.45565, 27.1554, 3.86714, 0.0299566, 0.184309, 1.46709;
+  Eigen::Matrix3d no_long, no_middle;
+  no_long << 0, 2.02344, -2.52581, 0, 1, 0, 0, 0, 1;
+  no_middle << 1, 0, 0, 0.494207, 0, 1.24827, 0, 0, 1;
+  const StructureKind kinds[] = {StructureKind::nerve,     StructureKind::vessel,      StructureKind::dura,
+                                 StructureKind::cartilage, StructureKind::soft_tissue, StructureKind::region};
+  for (const Eigen::Matrix3d& eye : {Eigen::Matrix3d(Eigen::Matrix3d::Identity()), no_long, no_middle}) {
+    const auto shown = [&](StructureKind kind) {
+      const std::uint32_t c = colour_of(kind);
+      const Vec3 light = to_cones.inverse() * eye * to_cones * Vec3(linear(c, 16), linear(c, 8), linear(c, 0));
+      return Vec3(light.cwiseMax(0.0).array().pow(1.0 / 2.2));
+    };
+    for (const StructureKind a : kinds)
+      for (const StructureKind b : kinds)
+        if (a < b) {
+          EXPECT_GT((shown(a) - shown(b)).norm(), 0.12) << static_cast<int>(a) << " " << static_cast<int>(b);
+        }
+  }
 }
 
 TEST(Clipping, APointIsDrawnOnTheInnerSideOfAllPlanes) {

@@ -237,7 +237,7 @@
     </message>
     <message>
         <source>The device cannot hold this force: the bone is harder than it feels.</source>
-        <translation>Das Gerät kann diese Kraft nicht halten: Der Knochen ist härter, als er sich anfühlt.</translation>
+        <translation>Das Gerät hält diese Kraft nicht: Der Knochen ist härter, als er sich anfühlt.</translation>
     </message>
     <message>
         <source>The bone gives %1 N, the hand gets %2 N, the device holds %3 N.</source>
@@ -779,6 +779,18 @@
         <source>&amp;Tour</source>
         <translation>&amp;Rundgang</translation>
     </message>
+    <message>
+        <source>Warn near structures at risk…</source>
+        <translation>Bei gefährdeten Strukturen warnen…</translation>
+    </message>
+    <message>
+        <source>Structures at risk</source>
+        <translation>Gefährdete Strukturen</translation>
+    </message>
+    <message>
+        <source>Warn when the tip is nearer than, mm</source>
+        <translation>Warnen, wenn die Spitze näher ist als, mm</translation>
+    </message>
 </context>
 <context>
     <name>PracticeRoom</name>
@@ -897,6 +909,25 @@
     <message>
         <source>Esc</source>
         <translation>Esc</translation>
+    </message>
+</context>
+<context>
+    <name>RiskGauge</name>
+    <message>
+        <source>Distance to the nearest structure at risk</source>
+        <translation>Abstand zur nächsten gefährdeten Struktur</translation>
+    </message>
+    <message>
+        <source>Inside %1</source>
+        <translation>In: %1</translation>
+    </message>
+    <message>
+        <source>Near %1: %2 mm</source>
+        <translation>Nahe an %1: %2 mm</translation>
+    </message>
+    <message>
+        <source>%1: %2 mm</source>
+        <translation>%1: %2 mm</translation>
     </message>
 </context>
 <context>
@@ -1302,6 +1333,18 @@
     <message>
         <source>Kept as view %1.</source>
         <translation>Als Ansicht %1 gemerkt.</translation>
+    </message>
+    <message>
+        <source>Planned axes and regions</source>
+        <translation>Geplante Achsen und Bereiche</translation>
+    </message>
+    <message>
+        <source>Structures at risk</source>
+        <translation>Gefährdete Strukturen</translation>
+    </message>
+    <message>
+        <source>Overlays</source>
+        <translation>Einblendungen</translation>
     </message>
 </context>
 <context>

@@ -1,0 +1,36 @@
+// The density of a bone as viewers have it: in steps, and only where there is bone.
+#pragma once
+#include <array>
+#include <cstdint>
+#include <span>
+#include <unordered_map>
+
+#include "common/geometry/lattice.hpp"
+
+namespace osteon {
+
+inline constexpr double kDensityStep_g_cm3 = 0.01;  // of a sample; more than 2.55 g/cm³ is sent as that
+inline constexpr std::size_t kDensitySamples = 512;
+inline constexpr std::size_t kMostDensityLeaves = 20000;  // 10 MB
+
+using DensityLeaf = std::array<std::uint8_t, kDensitySamples>;  // 8³ samples, z fastest
+
+class DensityGrid {
+ public:
+  DensityGrid() = default;
+  explicit DensityGrid(double pitch_mm) : pitch_mm_(pitch_mm) {}
+
+  // `leaf`: its first sample divided by 8. Sample (i, j, k) lies at (i, j, k) · pitch in the bone's frame.
+  void add(Coord leaf, const DensityLeaf& samples) { leaves_[leaf] = samples; }
+
+  [[nodiscard]] double pitch_mm() const { return pitch_mm_; }
+  [[nodiscard]] const std::unordered_map<Coord, DensityLeaf, CoordHash>& leaves() const { return leaves_; }
+  // Trilinear; 0 where there is no bone.
+  [[nodiscard]] double g_cm3(const Vec3& point_mm) const;
+
+ private:
+  double pitch_mm_ = 1.0;
+  std::unordered_map<Coord, DensityLeaf, CoordHash> leaves_;
+};
+
+}  // namespace osteon

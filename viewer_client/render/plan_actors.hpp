@@ -1,0 +1,35 @@
+// Draws what is planned and the structures at risk. All functions: [render], the thread that opened the window.
+#pragma once
+#include <cstdint>
+#include <memory>
+
+#include "common/surface/surgical_plan.hpp"
+
+class vtkRenderer;
+class vtkRenderWindow;
+
+namespace osteon {
+
+// Red, green, blue, 8 bits each. Colours of Okabe and Ito 2008, which people with any colour vision tell apart.
+[[nodiscard]] std::uint32_t colour_of(StructureKind kind);
+
+class PlanActors {
+ public:
+  // `bone`: the picture of the bone, which hides what is behind it. Both must outlive it.
+  PlanActors(vtkRenderer& bone, vtkRenderWindow& window);
+  ~PlanActors();
+
+  void show(const SurgicalPlan& plan);
+  // Both are off at first.
+  void set_planned(bool on);
+  void set_risks(bool on);
+  // Gives lines their width on the screen. Call this before each picture. `two_pictures`: the window has two pictures
+  // side by side. Then nothing is drawn through the bone, and axes have no names.
+  void place(bool two_pictures);
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace osteon
