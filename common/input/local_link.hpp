@@ -82,13 +82,13 @@ class LocalClient {
 // The window's end, with messages: it says `Said`, written by encode(), and hears `Heard`. For one thread; no call
 // waits.
 template <class Said, class Heard, Result<Heard> (*kRead)(std::string_view), LocalLinkNames (*kNames)()>
-class LinkServer {
+class LocalMessageServer {
  public:
   // Errors: those of LocalServer::listen().
-  [[nodiscard]] static Result<std::unique_ptr<LinkServer>> listen(const std::filesystem::path& socket) {
+  [[nodiscard]] static Result<std::unique_ptr<LocalMessageServer>> listen(const std::filesystem::path& socket) {
     auto link = LocalServer::listen(socket, kNames());
     if (!link) return tl::unexpected(link.error());
-    return std::unique_ptr<LinkServer>(new LinkServer(std::move(*link)));
+    return std::unique_ptr<LocalMessageServer>(new LocalMessageServer(std::move(*link)));
   }
 
   void send(const Said& message) {
@@ -112,7 +112,7 @@ class LinkServer {
   [[nodiscard]] std::uint64_t refused() const { return refused_; }  // messages that could not be read
 
  private:
-  explicit LinkServer(std::unique_ptr<LocalServer> link) : link_(std::move(link)) {}
+  explicit LocalMessageServer(std::unique_ptr<LocalServer> link) : link_(std::move(link)) {}
   void attend() {
     link_->attend([this](std::string_view text) {
       Result<Heard> message = kRead(text);
@@ -133,13 +133,13 @@ class LinkServer {
 
 // The client's end, with messages. For one thread.
 template <class Said, class Heard, Result<Heard> (*kRead)(std::string_view), LocalLinkNames (*kNames)()>
-class LinkClient {
+class LocalMessageClient {
  public:
   // Errors: those of LocalClient::connect().
-  [[nodiscard]] static Result<std::unique_ptr<LinkClient>> connect(const std::filesystem::path& socket) {
+  [[nodiscard]] static Result<std::unique_ptr<LocalMessageClient>> connect(const std::filesystem::path& socket) {
     auto link = LocalClient::connect(socket, kNames());
     if (!link) return tl::unexpected(link.error());
-    return std::unique_ptr<LinkClient>(new LinkClient(std::move(*link)));
+    return std::unique_ptr<LocalMessageClient>(new LocalMessageClient(std::move(*link)));
   }
 
   // The newest message that came within this time. None: none came.
@@ -159,7 +159,7 @@ class LinkClient {
   [[nodiscard]] std::uint64_t refused() const { return refused_; }  // messages that could not be read
 
  private:
-  explicit LinkClient(std::unique_ptr<LocalClient> link) : link_(std::move(link)) {}
+  explicit LocalMessageClient(std::unique_ptr<LocalClient> link) : link_(std::move(link)) {}
   std::unique_ptr<LocalClient> link_;
   std::uint64_t refused_ = 0;
 };

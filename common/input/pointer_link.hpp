@@ -50,7 +50,7 @@ struct PointerOutput {
 [[nodiscard]] LocalLinkNames pointer_link_names();
 
 // The window's end, and the haptic client's.
-using PointerServer = LinkServer<PointerInput, PointerOutput, read_pointer_output, pointer_link_names>;
-using PointerClient = LinkClient<PointerOutput, PointerInput, read_pointer_input, pointer_link_names>;
+using PointerServer = LocalMessageServer<PointerInput, PointerOutput, read_pointer_output, pointer_link_names>;
+using PointerClient = LocalMessageClient<PointerOutput, PointerInput, read_pointer_input, pointer_link_names>;
 
 }  // namespace osteon

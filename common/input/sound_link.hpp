@@ -46,7 +46,7 @@ struct SoundReport {
 [[nodiscard]] LocalLinkNames sound_link_names();
 
 // The window's end, and the audio client's.
-using SoundServer = LinkServer<SoundWish, SoundReport, read_sound_report, sound_link_names>;
-using SoundClient = LinkClient<SoundReport, SoundWish, read_sound_wish, sound_link_names>;
+using SoundServer = LocalMessageServer<SoundWish, SoundReport, read_sound_report, sound_link_names>;
+using SoundClient = LocalMessageClient<SoundReport, SoundWish, read_sound_wish, sound_link_names>;
 
 }  // namespace osteon

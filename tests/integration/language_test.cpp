@@ -293,6 +293,9 @@ TEST_F(LanguageTest, TheSurgeryViewIsWholeInBothLanguages) {
     open_bone();
     if (HasFatalFailure()) return;
     expect_whole(language);
+    const QSize least = window_->minimumSizeHint();
+    EXPECT_TRUE(least.width() <= 1024 && least.height() <= 600)
+        << language << ": a small screen has no room for " << least.width() << " by " << least.height();
     seen[language] = take_tools(language);
   }
   EXPECT_THAT(untranslated(seen["en"], seen["de"]), IsEmpty());

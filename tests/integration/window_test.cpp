@@ -217,6 +217,24 @@ TEST_F(WindowTest, WheelSpaceAndShiftSetPushSpindleAndFineMotion) {
   EXPECT_FALSE(view_->pointer().input().fine);
 }
 
+// A picture costs much of a processor where software draws it.
+TEST_F(WindowTest, ARestingToolIsNotDrawnAgainAndAgain) {
+  constexpr std::uint64_t kStates = 60, kMostFrames = 3;
+  open();
+  click_tool("drill");
+  hover(middle());
+  ASSERT_TRUE(until([&] { return view_->pointer().on_bone() && !view_->updater()->states().empty(); })) << problem();
+  const auto newest = [&] { return view_->updater()->states().front().state_seq; };
+  std::uint64_t frames = view_->frames(), first = newest();
+  EXPECT_TRUE(until([&] {
+    if (view_->frames() > frames + kMostFrames) {
+      frames = view_->frames();
+      first = newest();
+    }
+    return newest() >= first + kStates;
+  })) << problem();
+}
+
 TEST_F(WindowTest, APenPushesAsHardAsItIsPressed) {
   open();
   click_tool("drill");

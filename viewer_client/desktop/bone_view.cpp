@@ -107,21 +107,32 @@ void BoneView::draw() {
 }
 
 void BoneView::look(const CameraView& view) {
-  following_ = false;
+  following_ = whole_ = false;
   scene_->look(view);
   camera_moved();
 }
 
 CameraView BoneView::camera() const { return scene_->camera(); }
 
-void BoneView::look_overview() { look(overview(bounds_)); }
+void BoneView::look_whole(const CameraView& from) {
+  const int pictures = stereo_ == StereoMode::side_by_side ? 2 : 1;
+  const bool following = following_;
+  look(fitted(from, bounds_, static_cast<double>(width()) / (pictures * std::max(1, height()))));
+  following_ = following;
+  whole_ = true;
+}
+
+void BoneView::look_overview() {
+  following_ = false;
+  look_whole(overview(bounds_));
+}
 
 void BoneView::look_from(const Vec3& side) {
   CameraView view = overview(bounds_);
-  const double distance = (view.eye_mm - view.target_mm).norm();
-  view.eye_mm = view.target_mm + distance * side.normalized();
+  view.eye_mm = view.target_mm + side.normalized();
   view.up = std::abs(side.normalized().z()) < 0.9 ? Vec3(Vec3::UnitZ()) : Vec3(-Vec3::UnitY());
-  look(view);
+  following_ = false;
+  look_whole(view);
 }
 
 void BoneView::look_tool() {
@@ -219,6 +230,7 @@ void BoneView::turn_camera(const QPoint& by, Qt::KeyboardModifiers keys) {
 
 void BoneView::resizeEvent(QResizeEvent* event) {
   QVTKOpenGLNativeWidget::resizeEvent(event);
+  if (whole_) look_whole(camera());
   camera_moved();
 }
 

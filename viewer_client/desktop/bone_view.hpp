@@ -96,12 +96,15 @@ class BoneView : public QVTKOpenGLNativeWidget {
   void point_at(const QPoint& at);
   // The line of sight through a pixel of the picture, or of one of the two pictures side by side.
   [[nodiscard]] SightRay sight(const QPoint& at) const;
+  // Looks from there, so that the whole bone is in the picture, also when the window becomes smaller.
+  void look_whole(const CameraView& from);
   void turn_camera(const QPoint& by, Qt::KeyboardModifiers keys);
   void camera_moved();
   void follow_tool();
   void pointer_moved();
   void lift_pen();
 
+  bool whole_ = false;  // nobody has moved the camera since look_whole()
   Events events_;
   std::unique_ptr<BoneScene> scene_;
   std::optional<SceneUpdater> updater_;

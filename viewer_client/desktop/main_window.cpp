@@ -19,6 +19,7 @@
 #include <QMessageBox>
 #include <QMimeData>
 #include <QScrollArea>
+#include <QScrollBar>
 #include <QSettings>
 #include <QStackedWidget>
 #include <QStandardPaths>
@@ -124,7 +125,12 @@ void MainWindow::make_panels() {
   const auto dock = [this](const QString& title, const char* name, QWidget* widget, Qt::DockWidgetArea area) {
     auto* made = new QDockWidget(title, this);
     made->setObjectName(name);
-    made->setWidget(widget);
+    auto* scrolled = new QScrollArea;  // all panels together may be higher than the screen
+    scrolled->setFrameShape(QFrame::NoFrame);
+    scrolled->setWidgetResizable(true);
+    scrolled->setWidget(widget);
+    scrolled->setMinimumWidth(widget->minimumSizeHint().width() + scrolled->verticalScrollBar()->sizeHint().width());
+    made->setWidget(scrolled);
     addDockWidget(area, made);
     return made;
   };
@@ -142,11 +148,8 @@ void MainWindow::make_panels() {
   dock(tr("Tool"), "tool_panel", properties_, Qt::RightDockWidgetArea);
   dock(tr("Gauges"), "gauges_panel", gauges_, Qt::RightDockWidgetArea);
   dock(tr("Open the bone"), "clipping_panel", clipping_, Qt::RightDockWidgetArea)->hide();
-  auto* scrolled = new QScrollArea;  // its sentences would make the window higher than a small screen
-  scrolled->setFrameShape(QFrame::NoFrame);
-  scrolled->setWidgetResizable(true);
-  scrolled->setWidget(new ConnectionPanel([this] { return this->connections(); }));
-  QDockWidget* connections = dock(tr("Connections"), "connection_panel", scrolled, Qt::RightDockWidgetArea);
+  QDockWidget* connections = dock(tr("Connections"), "connection_panel",
+                                  new ConnectionPanel([this] { return this->connections(); }), Qt::RightDockWidgetArea);
   connections->hide();
   connections->toggleViewAction()->setObjectName("connections");
   connections->toggleViewAction()->setShortcut(QKeySequence("Ctrl+Shift+N"));

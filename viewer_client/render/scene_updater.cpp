@@ -4,30 +4,20 @@
 #include <chrono>
 #include <utility>
 
+#include "viewer_client/scene/looks_same.hpp"
+
 namespace osteon {
-
-namespace {
-
-// Whether two states of a tool look the same, in the picture and in its gauges.
-bool looks_same(const CuttingState& a, const CuttingState& b) {
-  return a.author == b.author && a.tool_name == b.tool_name && a.phase == b.phase && a.on_metal == b.on_metal &&
-         a.pose_bone_tool.position_mm == b.pose_bone_tool.position_mm &&
-         a.pose_bone_tool.rotation.coeffs() == b.pose_bone_tool.rotation.coeffs() &&
-         a.pose_bone_device.position_mm == b.pose_bone_device.position_mm &&
-         a.pose_bone_device.rotation.coeffs() == b.pose_bone_device.rotation.coeffs() &&
-         a.spindle_rpm == b.spindle_rpm && a.force_physical_N == b.force_physical_N && a.depth_mm == b.depth_mm &&
-         a.engaged_fraction == b.engaged_fraction && a.density_g_cm3 == b.density_g_cm3;
-}
-
-}  // namespace
 
 bool SceneUpdater::update(bool tools_shown) {
   Delivery delivery = queue_->take();
   bool changed = false;
   for (const Tool& tool : delivery.tools) scene_->learn_tool(tool);
   if (delivery.any_states) {
-    changed = tools_shown && !std::ranges::equal(states_, delivery.states, looks_same);
     states_ = std::move(delivery.states);
+    changed = tools_shown && !std::ranges::equal(drawn_, states_, [](const CuttingState& a, const CuttingState& b) {
+                return looks_same(a, b);
+              });
+    if (changed) drawn_ = states_;
     bodies_ = std::move(delivery.bodies);
     if (items_ != delivery.items || !delivery.tools.empty()) {
       items_ = std::move(delivery.items);

@@ -54,6 +54,7 @@ class SceneUpdater {
   BoneScene* scene_;
   SurfaceScene surface_;
   std::vector<CuttingState> states_;
+  std::vector<CuttingState> drawn_;  // when the tools changed last; many small motions add up to one that is seen
   std::vector<SceneItem> items_;
   std::vector<BodyId> bodies_;
   std::shared_ptr<const SurgicalPlan> plan_;  // shared with the scene and with distances

@@ -1,5 +1,6 @@
 #include "viewer_client/scene/camera_view.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 namespace osteon {
@@ -99,6 +100,27 @@ CameraView overview(const Box& bone) {
   view.eye_mm = view.target_mm + distance_mm * towards_eye;
   view.up = Vec3::UnitZ();
   return view;
+}
+
+CameraView fitted(const CameraView& view, const Box& bone, double width_over_height) {
+  constexpr double kMargin = 1.05;
+  const Vec3 back = view.eye_mm - view.target_mm;
+  if (!(back.norm() > kLeastSight_mm)) return view;
+  const Eigen::Matrix3d seen = picture_axes(view, back);
+  const double half_height = std::tan(0.5 * view.view_angle_rad) / kMargin;  // of the picture, at a distance of 1
+  CameraView fits = view;
+  fits.target_mm = 0.5 * (bone.min_mm + bone.max_mm);
+  double distance_mm = 0.0;
+  for (int corner = 0; corner < 8; ++corner) {
+    Vec3 p = bone.min_mm;
+    for (int axis = 0; axis < 3; ++axis)
+      if ((corner >> axis & 1) != 0) p[axis] = bone.max_mm[axis];
+    const Vec3 at = seen.transpose() * (p - fits.target_mm);
+    const double aside = std::max(std::abs(at.x()) / width_over_height, std::abs(at.y()));
+    distance_mm = std::max(distance_mm, at.z() + aside / half_height);
+  }
+  fits.eye_mm = fits.target_mm + std::max(distance_mm, kLeastSight_mm) * Vec3(seen.col(2));
+  return fits;
 }
 
 CameraView beside_tool(const Pose& pose_bone_tool, double distance_mm) {

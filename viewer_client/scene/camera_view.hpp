@@ -37,6 +37,8 @@ struct SightRay {
 
 // The whole bone from the front, from its left and slightly above (DICOM LPS: +x left, -y front, +z up).
 [[nodiscard]] CameraView overview(const Box& bone);
+// The same direction, from where the whole box fits into a picture of this shape, with a margin of a twentieth.
+[[nodiscard]] CameraView fitted(const CameraView& view, const Box& bone, double width_over_height);
 
 // Looks at the tool's tip from a distance of `distance_mm`. The camera is behind the tool and beside its axis, so that
 // the shank does not hide the hole.

@@ -179,6 +179,35 @@ TEST(CameraView, OverviewHoldsTheWholeBone) {
   EXPECT_GT(view.up.dot(Vec3::UnitZ()), 0.9);
 }
 
+// A pinhole camera: a point is at (x, y) / depth in units of the half height of the picture, over the tangent of half
+// of the angle.
+TEST(CameraView, AFittedBoxTouchesTheMarginOfThePictureInEveryShape) {
+  const Box femur{Vec3(-45, -60, -430), Vec3(50, 40, 25)}, skull{Vec3(-70, -90, 10), Vec3(80, 100, 190)};
+  for (const Box& bone : {femur, skull})
+    for (const double shape : {0.5, 1.0, 16.0 / 9.0, 3.0})
+      for (const Vec3& from : {Vec3(0.62, -0.72, 0.30), Vec3(0, -1, 0), Vec3(1, 0, 0), Vec3(0, 0.3, 1)}) {
+        CameraView before;
+        before.target_mm = Vec3(1000, 0, 0);
+        before.eye_mm = before.target_mm + from;
+        const CameraView view = fitted(before, bone, shape);
+        const Vec3 sight = (view.target_mm - view.eye_mm).normalized();
+        EXPECT_LT((sight + from.normalized()).norm(), 1e-9);
+        const Vec3 right = sight.cross(Vec3::UnitZ()).normalized(), up = right.cross(sight);
+        double nearest = 0;  // to the border of the picture, which is at 1
+        for (int corner = 0; corner < 8; ++corner) {
+          const Vec3 p((corner & 1 ? bone.max_mm : bone.min_mm).x(), (corner & 2 ? bone.max_mm : bone.min_mm).y(),
+                       (corner & 4 ? bone.max_mm : bone.min_mm).z());
+          const Vec3 seen = p - view.eye_mm;
+          const double half_height = std::tan(0.5 * view.view_angle_rad) * seen.dot(sight);
+          ASSERT_GT(half_height, 0);
+          nearest = std::max(
+              {nearest, std::abs(seen.dot(up)) / half_height, std::abs(seen.dot(right)) / (half_height * shape)});
+        }
+        EXPECT_LT(nearest, 0.96);
+        EXPECT_GT(nearest, 0.94);
+      }
+}
+
 TEST(CameraView, BesideToolSeesTheTipFromBehindTheTool) {
   for (const Vec3& axis : {Vec3(0, 0, 1), Vec3(0, 1, 0), Vec3(0, -1, 0), Vec3(-1, 0.2, -0.4), Vec3(0.5, 0.5, 0.7)}) {
     const Pose pose = pose_along({10, 20, 30}, axis);
