@@ -13,6 +13,8 @@ class VolumeRamp {
 
   // Multiplies each sample by a factor that moves to `wanted`, 0 to 1. [audio]
   void apply(std::span<float> mono, double wanted) noexcept {
+    if (!begun_) factor_ = wanted;  // nothing was heard before
+    begun_ = true;
     for (float& x : mono) {
       factor_ += std::clamp(wanted - factor_, -step_, step_);
       x = static_cast<float>(factor_ * x);
@@ -21,7 +23,8 @@ class VolumeRamp {
 
  private:
   double step_;
-  double factor_ = 1.0;
+  double factor_ = 0.0;
+  bool begun_ = false;
 };
 
 }  // namespace osteon::audio

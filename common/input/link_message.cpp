@@ -10,7 +10,10 @@ namespace osteon {
 
 using nlohmann::json;
 
-std::string shortened(const std::string& text) {
+std::string shortened(const std::string& any) {
+  // An invalid byte becomes a character of three bytes, so it is replaced before the size counts.
+  const std::string text =
+      json::parse(json(any).dump(-1, ' ', false, json::error_handler_t::replace)).get<std::string>();
   if (text.size() <= kMostLinkText) return text;
   std::size_t end = kMostLinkText;
   const auto within_character = [&] { return (static_cast<unsigned char>(text[end]) & 0xc0U) == 0x80U; };

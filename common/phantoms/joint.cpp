@@ -292,7 +292,7 @@ Result<JointChanges> joint_changes(std::string_view kind, const std::map<std::st
                               : std::string(members.front().member) + "." + std::string(members.front().names.front());
     std::string message = "\"" + name + "\" is no parameter of a " + std::string(kind) + "; write ";
     for (const std::string_view known : own) message.append(known).append(", ");
-    return bad_input(message + "or a bone's parameter after its name, such as " + example);
+    return bad_input(message.append("or a bone's parameter after its name, such as ").append(example));
   }
   return found;
 }

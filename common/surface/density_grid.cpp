@@ -4,8 +4,13 @@
 
 namespace osteon {
 
+namespace {
+constexpr double kFarthestSample = 1 << 30;  // its neighbours are numbers of 32 bits too
+}
+
 double DensityGrid::g_cm3(const Vec3& point_mm) const {
   const Vec3 at = point_mm / pitch_mm_;
+  if (!(at.cwiseAbs().maxCoeff() < kFarthestSample)) return 0.0;
   const Vec3 floor = at.array().floor();
   const Vec3 t = at - floor;
   const Coord first{static_cast<std::int32_t>(floor.x()), static_cast<std::int32_t>(floor.y()),

@@ -25,7 +25,7 @@ class DensityGrid {
 
   [[nodiscard]] double pitch_mm() const { return pitch_mm_; }
   [[nodiscard]] const std::unordered_map<Coord, DensityLeaf, CoordHash>& leaves() const { return leaves_; }
-  // Trilinear; 0 where there is no bone.
+  // Density at a point of the bone's frame: trilinear; 0 where there is no bone. Any thread.
   [[nodiscard]] double g_cm3(const Vec3& point_mm) const;
 
  private:

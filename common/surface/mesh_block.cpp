@@ -267,7 +267,8 @@ class Mesher {
         vertex.place = edge_place(field[a], field[b]);
         vertex.gradient = gradient_between(raw + a, raw + b, t, kSlab, kRow);
         vertex.cut = surface[a] + t * (surface[b] - surface[a]) < below_surface;
-        // Beside a seam the vertex follows the coarser contour, which also lies below round bone that nobody has cut.
+        // Beside a seam the vertex follows the coarser contour. On a curved surface that contour lies inside uncut
+        // bone. So its depth does not show a cut, only a changed sample does.
         if (ruled && vertex.cut) vertex.cut = raw[a] != surface[a] || raw[b] != surface[b];
         if (tissue_) vertex.tissue = tissue_[field[a] < 0.0f ? a : b];
       }

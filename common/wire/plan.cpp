@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <cstdlib>
 #include <string>
 #include <utility>
 
@@ -14,8 +16,14 @@ namespace {
 constexpr std::size_t kPartPoints = 65536, kPartTriangles = 65536;
 constexpr int kMostPlanned = 1000, kMostStructures = 2000;  // as a case may have
 
+constexpr double kLeastPitch_mm = 1e-3, kMostPitch_mm = 100.0;
+constexpr std::int32_t kFarthestLeaf = 1 << 20;
+
 tl::unexpected<Error> bad_plan(const std::string& what) {
   return failure(ErrorCode::invalid_input, "the plan from the server has " + what);
+}
+tl::unexpected<Error> bad_density(const std::string& what) {
+  return failure(ErrorCode::invalid_input, "the density from the server has " + what);
 }
 
 bool is_unit(const Vec3& v) { return v.allFinite() && std::abs(v.norm() - 1.0) < 1e-3; }
@@ -79,17 +87,19 @@ Result<void> PlanReader::begin(const v1::GetPlanResponse& message) {
   for (const v1::PlannedAxis& axis : message.axes()) {
     plan_.axes.push_back({axis.name(), from_wire(axis.point_mm()), from_wire(axis.direction())});
     if (!plan_.axes.back().point_mm.allFinite() || !is_unit(plan_.axes.back().direction))
-      return bad_plan("an axis that is none");
+      return bad_plan("an axis without a point or a unit vector");
   }
   for (const v1::PlannedPlane& plane : message.planes()) {
     plan_.planes.push_back({plane.name(), from_wire(plane.point_mm()), from_wire(plane.normal())});
     if (!plan_.planes.back().point_mm.allFinite() || !is_unit(plan_.planes.back().normal))
-      return bad_plan("a plane that is none");
+      return bad_plan("a plane without a point or a unit vector");
   }
   for (const v1::PlannedBox& box : message.boxes()) {
     plan_.boxes.push_back({box.name(), from_wire(box.min_mm()), from_wire(box.max_mm())});
-    if (!plan_.boxes.back().min_mm.allFinite() || !plan_.boxes.back().max_mm.allFinite())
-      return bad_plan("a box that is none");
+    const SurgicalPlan::Region& region = plan_.boxes.back();
+    if (!region.min_mm.allFinite() || !region.max_mm.allFinite() ||
+        (region.min_mm.array() > region.max_mm.array()).any())
+      return bad_plan("a box without two corners, the lower one first");
   }
   std::size_t triangles = 0;
   for (const v1::LabelledStructure& structure : message.structures()) {
@@ -114,13 +124,14 @@ Result<void> PlanReader::add(const v1::SurfacePart& part) {
   const Size& size = sizes_[part.structure()];
   const auto points = static_cast<std::size_t>(part.points_mm_size()),
              corners = static_cast<std::size_t>(part.triangles_size());
+  if (points + corners == 0) return bad_plan("an empty part");
   if (points % 3 != 0 || corners % 3 != 0 || mesh.positions_mm.size() + points / 3 > size.points ||
       mesh.triangles.size() + corners / 3 > size.triangles)
     return bad_plan("a part of a wrong size");
   for (int i = 0; i < part.points_mm_size(); i += 3) {
     mesh.positions_mm.push_back({part.points_mm(i), part.points_mm(i + 1), part.points_mm(i + 2)});
     if (!std::ranges::all_of(mesh.positions_mm.back(), [](float value) { return std::isfinite(value); }))
-      return bad_plan("a point that is none");
+      return bad_plan("a point that is not finite");
   }
   for (int i = 0; i < part.triangles_size(); i += 3) {
     mesh.triangles.push_back({part.triangles(i), part.triangles(i + 1), part.triangles(i + 2)});
@@ -131,6 +142,10 @@ Result<void> PlanReader::add(const v1::SurfacePart& part) {
 }
 
 Result<void> PlanReader::add(const v1::GetPlanResponse& message) {
+  if (complete_) return bad_plan("a message after its end");
+  const int listed = message.axes_size() + message.planes_size() + message.boxes_size() + message.structures_size();
+  if (begun_ && listed != 0) return bad_plan("a list after its first message");
+  if (begun_ && message.parts_size() == 0) return bad_plan("an empty message");
   if (!begun_)
     if (Result<void> good = begin(message); !good) return good;
   begun_ = true;
@@ -141,7 +156,7 @@ Result<void> PlanReader::add(const v1::GetPlanResponse& message) {
 }
 
 Result<SurgicalPlan> PlanReader::finish() {
-  if (!complete_) return bad_plan("no end");
+  if (!complete_) return failure(ErrorCode::invalid_input, "the plan from the server ended too early");
   for (std::size_t s = 0; s < sizes_.size(); ++s)
     if (plan_.structures[s].surface.positions_mm.size() != sizes_[s].points ||
         plan_.structures[s].surface.triangles.size() != sizes_[s].triangles)
@@ -164,24 +179,31 @@ std::vector<v1::GetDensityResponse> to_wire(const DensityGrid& density) {
 }
 
 Result<void> DensityReader::add(const v1::GetDensityResponse& message) {
-  if (!(message.pitch_mm() > 0.0) || !std::isfinite(message.pitch_mm()) ||
+  if (complete_) return bad_density("a message after its end");
+  if (!(message.pitch_mm() >= kLeastPitch_mm && message.pitch_mm() <= kMostPitch_mm) ||
       (begun_ && message.pitch_mm() != density_.pitch_mm()))
-    return bad_plan("a density of no pitch");
+    return bad_density("an invalid pitch");
+  if (begun_ && message.leaves_size() == 0) return bad_density("an empty message");
   if (!begun_) density_ = DensityGrid(message.pitch_mm());
   begun_ = true;
   for (const v1::DensityLeaf& leaf : message.leaves()) {
     DensityLeaf samples;
+    const Coord place = from_wire(leaf.leaf());
     if (leaf.samples().size() != samples.size() || density_.leaves().size() >= kMostDensityLeaves)
-      return bad_plan("a density of a wrong size");
+      return bad_density("a wrong size");
+    if (std::max({std::abs(std::int64_t{place.x}), std::abs(std::int64_t{place.y}), std::abs(std::int64_t{place.z})}) >
+            kFarthestLeaf ||
+        density_.leaves().contains(place))
+      return bad_density("a leaf that is too far away, or comes twice");
     std::copy(leaf.samples().begin(), leaf.samples().end(), samples.begin());
-    density_.add(from_wire(leaf.leaf()), samples);
+    density_.add(place, samples);
   }
   complete_ = message.complete();
   return {};
 }
 
 Result<DensityGrid> DensityReader::finish() {
-  if (!complete_) return bad_plan("a density without an end");
+  if (!complete_) return failure(ErrorCode::invalid_input, "the density from the server ended too early");
   return std::move(density_);
 }
 

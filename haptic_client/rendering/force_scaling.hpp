@@ -4,10 +4,10 @@
 //
 //   c(F) = s · F0 · ln(1 + F / F0),   0 <= F <= Ff,   c(Ff) = the budget
 //
-// F0 is the knee. Far below it c is s · F, and the ratio of two forces is kept. The ratio of two forces F and r · F is
-// shown as ln(1 + r · F / F0) / ln(1 + F / F0), which lies between 1 and r. Far above the knee equal ratios become
-// equal differences: c(r · F) - c(F) approaches s · F0 · ln r. Between zero and Ff the map is strictly monotone, so a
-// harder bone is never shown as the softer one.
+// F0 is the knee. Far below it c is s · F, and the ratio of two forces is kept. The ratio of two forces F and r · F
+// is shown as ln(1 + r · F / F0) / ln(1 + F / F0), which lies between 1 and r. Far above the knee equal ratios become
+// equal differences: c(r · F) - c(F) approaches s · F0 · ln r. Between zero and Ff the map is strictly monotone, so
+// a harder bone is never shown as the softer one.
 //
 // A spring F = k · e is shown as c(k · e). That is again a spring without hysteresis: its energy is the integral of c
 // over e. It is nowhere stiffer than s · k.

@@ -336,7 +336,7 @@ void HapticLoop::show(const LoopInput& input, const ToolModel& model, const Coup
   const double room_n = std::max(0.0, limit_n - shown_.force_n.norm() - motor_n.norm());
   lead(input, meet(input, {room_n, std::clamp(slow - grown_n, 0.0, slow), by_hand_n + slow}, report), report);
   together_n_ = report.coupling.device_n + report.guidance.device_n + report.partners.device_n;
-  report.cue.device_n = cue_n(report, safe);
+  report.cue.device_n = cue_n(report, limit_n, safe);
   report.device.force_n = together_n_ + report.motor.device_n + report.cue.device_n;
 
   // The same for the moment of the cut, never a force. It is at most what the shown force would be at the arm of a
@@ -350,11 +350,15 @@ void HapticLoop::show(const LoopInput& input, const ToolModel& model, const Coup
   report.device.torque_nmm = report.coupling.device_nmm + report.motor.device_nmm;
 }
 
-Vec3 HapticLoop::cue_n(const LoopReport& report, bool safe) noexcept {
-  if (!(params_.cue_n > 0.0) || !safe || report.cutting.phase != CuttingPhase::cutting) return Vec3::Zero();
+Vec3 HapticLoop::cue_n(const LoopReport& report, double limit_n, bool safe) noexcept {
+  if (!(params_.cue_n > 0.0) || !safe || report.cutting.phase != CuttingPhase::cutting) {
+    cue_phase_ = 0.0;  // the next vibration begins without a step
+    return Vec3::Zero();
+  }
   cue_phase_ = std::fmod(cue_phase_ + kCue_hz * params_.dt_s, 1.0);
   const double feed = std::max(0.0, report.cutting.feed_mm_per_s);
-  const double amplitude_n = ramp_ * motor_.open() * params_.cue_n * feed / (feed + kHalfCue_mm_per_s);
+  const double amplitude_n = ramp_ * motor_.open() * params_.cue_n * std::min(1.0, limit_n / params_.continuous_n) *
+                             feed / (feed + kHalfCue_mm_per_s);
   const double now_n = amplitude_n * std::sin(2.0 * std::numbers::pi * cue_phase_);
   return to_device(now_n * report.pose_bone_proxy.direction(Vec3::UnitZ()));
 }

@@ -75,7 +75,7 @@ struct LoopInput {
 // Bits of LoopReport::events.
 enum LoopEvent : std::uint32_t {
   kUncovered = 1,     // no patch around the tool: no force, the tool stays
-  kForceLimited = 2,  // the device's limit cut the force
+  kForceLimited = 2,  // the limit of the device, or of an instructor, cut the force
   kSlewLimited = 4,
   kCutsWaiting = 8,  // too many cuts wait for the replica: the tool rubs until the replica has caught up
   kMissedTicks = 16,
@@ -223,8 +223,9 @@ class HapticLoop {
   void lead(const LoopInput& input, const Left& left, LoopReport& report) noexcept;
   // Adds the force of others' tools. Returns what it leaves.
   Left meet(const LoopInput& input, const Left& left, LoopReport& report) noexcept;
-  // The vibration of the feed cue, device frame.
-  [[nodiscard]] Vec3 cue_n(const LoopReport& report, bool safe) noexcept;
+  // The vibration of the feed cue, device frame. `limit_n`: of the shown force, N on the device. An instructor's limit
+  // makes the vibration smaller in the same proportion.
+  [[nodiscard]] Vec3 cue_n(const LoopReport& report, double limit_n, bool safe) noexcept;
   // Permitted growth of force on the device in this tick that the hand did not cause.
   [[nodiscard]] double slow_n(const LoopInput& input) const noexcept;
   // A force or torque that rises by no more than `most`. `now`: what is shown.

@@ -298,7 +298,8 @@ SessionTick PointerSession::tick(const Patch& patch, RoomLink room, int periods,
   state.on_metal = (last_.events & kOnMetal) != 0;
   state.device_holds_n = device_.limits().continuous_n;
   // It holds its peak for moments only.
-  state.saturated = (last_.events & kForceLimited) != 0 || last_.device.force_n.norm() > state.device_holds_n;
+  // An instructor's limit may be lower. Then the device is not the reason.
+  state.saturated = last_.device.force_n.norm() > 0.999 * state.device_holds_n;
   state.tool = last_.tool;
   exchange_.states.publish();
   return result;

@@ -197,7 +197,7 @@ void OpenRoom::maintain(const std::function<bool()>& stop) {
 Rooms::Rooms(RoomsOptions options) : options_(std::move(options)), cases_(options_.case_memory_bytes) {
   OSTEON_CHECK(!options_.cases.empty());
   for (const ServedCase& served : options_.cases) cases_.keep(served);
-  for (JobThread* calls : {&jobs, &files, &recordings, &checks}) calls->start();
+  for (JobThread* calls : {&jobs, &files, &plans, &recordings, &checks}) calls->start();
   maintenance_ = std::thread([this] { run_maintenance(); });
 }
 
@@ -208,7 +208,7 @@ Rooms::~Rooms() {
 }
 
 void Rooms::end_calls() {
-  for (JobThread* calls : {&jobs, &files, &recordings, &checks}) calls->stop();
+  for (JobThread* calls : {&jobs, &files, &plans, &recordings, &checks}) calls->stop();
 }
 
 void Rooms::run_maintenance() {

@@ -194,6 +194,9 @@ class Rooms {
   JobThread jobs;  // everything that changes the rooms: one at a time; opening one may take minutes
   // What every client asks for: the lists of rooms and of cases, and a case's files in parts.
   JobThread files;
+  // Makes the surfaces of a case's structures and its density, for seconds each. Not `files`: clients that download a
+  // case would wait.
+  JobThread plans;
   // Reads journals for demonstrations. Reading that of a closed room waits while any room is being changed.
   JobThread recordings;
   JobThread checks;        // uploaded cases; a process checks each, for as long as UploadQuota allows

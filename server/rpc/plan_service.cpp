@@ -1,7 +1,9 @@
 // The service that sends what a case says beside its bone.
 #include <grpcpp/grpcpp.h>
 
+#include <algorithm>
 #include <cstddef>
+#include <deque>
 #include <functional>
 #include <memory>
 #include <string>
@@ -21,26 +23,36 @@ namespace {
 
 using PlanMessages = std::vector<Bytes>;
 
-// What was sent last, for the next viewer of the same case. [thread for files]
-class LastSent {
+// What was sent of the newest cases, for their next viewers. A case that cannot be sent is remembered too, so that
+// asking again costs nothing. [thread for plans]
+class SentCases {
  public:
   // `make`: what is sent of a case.
   using Make = std::function<Result<PlanMessages>(const KnownCase& served, const Case& bone)>;
-  explicit LastSent(Make make) : make_(std::move(make)) {}
+  using Messages = Result<std::shared_ptr<const PlanMessages>>;
+  explicit SentCases(Make make) : make_(std::move(make)) {}
 
-  Result<std::shared_ptr<const PlanMessages>> get(const KnownCase& served, const Case& bone) {
-    if (messages_ && case_ == served.hash) return messages_;
+  Messages get(const KnownCase& served, const Case& bone) {
+    const auto known = std::ranges::find(cases_, served.hash, &Sent::hash);
+    if (known != cases_.end()) return known->messages;
     Result<PlanMessages> made = make_(served, bone);
-    if (!made) return tl::unexpected(made.error());
-    case_ = served.hash;
-    messages_ = std::make_shared<const PlanMessages>(std::move(*made));
-    return messages_;
+    // A disk that cannot be read now may be readable later.
+    if (!made && made.error().code != ErrorCode::exhausted && made.error().code != ErrorCode::invalid_input)
+      return tl::unexpected(made.error());
+    if (cases_.size() == kMostCases) cases_.pop_front();
+    cases_.push_back({served.hash, made ? Messages(std::make_shared<const PlanMessages>(std::move(*made)))
+                                        : Messages(tl::unexpected(made.error()))});
+    return cases_.back().messages;
   }
 
  private:
+  static constexpr std::size_t kMostCases = 4;  // of up to 100 MB each
+  struct Sent {
+    Digest hash;
+    Messages messages;  // shared with the streams that send them
+  };
   const Make make_;
-  Digest case_{};
-  std::shared_ptr<const PlanMessages> messages_;  // shared with the streams that send them
+  std::deque<Sent> cases_;  // oldest first
 };
 
 template <class Message>
@@ -52,6 +64,12 @@ PlanMessages all_serialised(const std::vector<Message>& messages) {
 
 class PlanStream final : public OutStream<WriteReactor> {
  public:
+  // The reader has left, or may not have it any more.
+  [[nodiscard]] bool over() const {
+    const MutexLock lock(mutex_);
+    return done() || failing();
+  }
+
   void send(std::shared_ptr<const PlanMessages> messages) {
     const MutexLock lock(mutex_);
     messages_ = std::move(messages);
@@ -67,7 +85,7 @@ class PlanStream final : public OutStream<WriteReactor> {
   }
   void leave() override {}
 
-  std::shared_ptr<const PlanMessages> messages_ OSTEON_GUARDED_BY(mutex_);  // shared with LastSent
+  std::shared_ptr<const PlanMessages> messages_ OSTEON_GUARDED_BY(mutex_);  // shared with SentCases
   std::size_t next_ OSTEON_GUARDED_BY(mutex_) = 0;
 };
 
@@ -88,7 +106,7 @@ class PlanServiceImpl final : public PlanBase {
  private:
   template <class Request>
   WriteReactor* send(grpc::CallbackServerContext* context, const ByteBuffer& bytes, const char* method,
-                     const std::shared_ptr<LastSent>& last) {
+                     const std::shared_ptr<SentCases>& last) {
     if (const auto why = refusal_of<Request>(rooms_, *context)) return refused(*why);
     const std::string name = Request::descriptor()->name();
     const auto request = parse<Request>(bytes);
@@ -104,7 +122,8 @@ class PlanServiceImpl final : public PlanBase {
     const auto made = std::make_shared<PlanStream>();  // shared with gRPC
     PlanStream* stream = PlanStream::launch(made, context);
     if (stream->stand_under(rooms_.authorizer, *caller, (*room)->name, {}, method))
-      rooms_.files.run([last, made, room = *room, served = *served] {
+      rooms_.plans.run([last, made, room = *room, served = *served] {
+        if (made->over()) return;
         const auto messages = last->get(served, room->runtime().bone());
         if (messages)
           made->send(*messages);
@@ -116,14 +135,14 @@ class PlanServiceImpl final : public PlanBase {
 
   Rooms& rooms_;
   // Shared with jobs that wait.
-  const std::shared_ptr<LastSent> plan_ =
-      std::make_shared<LastSent>([](const KnownCase& served, const Case& bone) -> Result<PlanMessages> {
+  const std::shared_ptr<SentCases> plan_ =
+      std::make_shared<SentCases>([](const KnownCase& served, const Case& bone) -> Result<PlanMessages> {
         const Result<SurgicalPlan> plan = load_plan(served.folder, bone);
         if (!plan) return tl::unexpected(plan.error());
         return all_serialised(wire::to_wire(*plan));
       });
-  const std::shared_ptr<LastSent> density_ =
-      std::make_shared<LastSent>([](const KnownCase&, const Case& bone) -> Result<PlanMessages> {
+  const std::shared_ptr<SentCases> density_ =
+      std::make_shared<SentCases>([](const KnownCase&, const Case& bone) -> Result<PlanMessages> {
         return all_serialised(wire::to_wire(density_of(bone)));
       });
 };

@@ -267,7 +267,7 @@ TEST_F(WindowTest, APenPushesAsHardAsItIsPressed) {
   EXPECT_FALSE(view_->pointer().pushing());
   EXPECT_EQ(view_->pointer().push_n(), 12.0);
   // The window shows what bone and hand give, and what the device holds: the simulated hand 30 N.
-  EXPECT_TRUE(until([&] { return label("budget_words").endsWith("the device holds 30.0 N."); }))
+  EXPECT_TRUE(until([&] { return label("budget_words").endsWith("The device can hold: 30.0 N."); }))
       << label("budget_words").toStdString();
   // Its barrel button, and a pen without a tool, are the mouse's.
   EXPECT_FALSE(pen(QEvent::TabletPress, middle(), 0.0, Qt::RightButton, Qt::RightButton));

@@ -117,7 +117,7 @@ CameraView BoneView::camera() const { return scene_->camera(); }
 void BoneView::look_whole(const CameraView& from) {
   const int pictures = stereo_ == StereoMode::side_by_side ? 2 : 1;
   const bool following = following_;
-  look(fitted(from, bounds_, static_cast<double>(width()) / (pictures * std::max(1, height()))));
+  look(fitted(from, bounds_, static_cast<double>(std::max(1, width())) / (pictures * std::max(1, height()))));
   following_ = following;
   whole_ = true;
 }
@@ -270,7 +270,7 @@ void BoneView::mouseMoveEvent(QMouseEvent* event) {
 
 void BoneView::mouseReleaseEvent(QMouseEvent* event) {
   if (event->button() == Qt::LeftButton && pointer_.pushing()) {
-    pointer_.release();
+    lift_pen();
     point_at(event->pos());
     pointer_moved();
   }
@@ -286,8 +286,11 @@ void BoneView::mouseReleaseEvent(QMouseEvent* event) {
 // the mouse: the pen's other buttons, and the pen without a tool or beside the bone.
 void BoneView::tabletEvent(QTabletEvent* event) {
   event->ignore();
-  if (!holding_ || camera_drag_ || (event->buttons() & ~Qt::MouseButtons(Qt::LeftButton)) != Qt::NoButton) return;
   const QPoint at = event->pos();
+  const bool lifted = event->type() == QEvent::TabletRelease && event->button() == Qt::LeftButton && wheel_push_n_;
+  if (!holding_ || camera_drag_) return;
+  // A button at the pen's side turns the bone. The tip may be lifted while it is still down.
+  if (!lifted && (event->buttons() & ~Qt::MouseButtons(Qt::LeftButton)) != Qt::NoButton) return;
   if (event->type() == QEvent::TabletRelease) {
     if (!wheel_push_n_) return;
     lift_pen();

@@ -55,7 +55,7 @@ QString text_of_haptic(const ConnectionState& state) {
   if (!state.practice) return PanelText::tr("not in this window");
   QString measured;
   if (state.pointer_silence_ms)
-    measured = PanelText::tr("heard %1 ms ago").arg(QLocale().toString(*state.pointer_silence_ms, 'f', 0));
+    measured = PanelText::tr("last message %1 ms ago").arg(QLocale().toString(*state.pointer_silence_ms, 'f', 0));
   return text_of_program(state.haptic, measured);
 }
 
@@ -74,7 +74,7 @@ QString text_of_audio(const ConnectionState& state) {
   if (!state.sound_on)
     measured = PanelText::tr("switched off");
   else if (state.sound && state.sound->trouble.empty())
-    measured = PanelText::tr("%1 late").arg(in_ms(state.sound->latency_ms));
+    measured = PanelText::tr("delay %1").arg(in_ms(state.sound->latency_ms));
   else if (state.sound)
     measured = PanelText::tr("no device");
   return text_of_program(state.audio, measured);
@@ -97,7 +97,7 @@ QStringList advice_of(const ConnectionState& state) {
     if (!state.pointer_connected)
       lines << PanelText::tr("Wait some seconds: the haptic client makes its tools ready.");
     else if (state.pointer_silence_ms && *state.pointer_silence_ms > kSilent_ms)
-      lines << PanelText::tr("The haptic client is silent. End what else keeps this computer busy.");
+      lines << PanelText::tr("The haptic client is silent. Close other programs that use the processor.");
   }
   if (state.sound_on && state.sound && !state.sound->trouble.empty()) {
     lines << PanelText::tr("No sound device: %1").arg(QString::fromStdString(state.sound->trouble));
@@ -109,7 +109,7 @@ QStringList advice_of(const ConnectionState& state) {
 QString role_of(const ConnectionState& state) {
   if (state.practice) return PanelText::tr("You practise alone.");
   if (!state.joined) return QString("–");
-  return state.watching ? PanelText::tr("You watch.") : PanelText::tr("You are a guest with a view.");
+  return state.watching ? PanelText::tr("You watch.") : PanelText::tr("You joined this room as a viewer.");
 }
 
 }  // namespace
@@ -166,7 +166,7 @@ void ConnectionPanel::refresh() {
   put(device_, text_of_device(state));
   put(audio_, text_of_audio(state));
   const QStringList advice = advice_of(state);
-  put(advice_, advice.isEmpty() ? tr("Nothing. All works.") : advice.join("\n"));
+  put(advice_, advice.isEmpty() ? tr("Nothing: everything works.") : advice.join("\n"));
 }
 
 }  // namespace osteon

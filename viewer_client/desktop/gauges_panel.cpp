@@ -130,7 +130,7 @@ void GaugesPanel::show_budget(double bone_n, const std::optional<PointerOutput>&
   const double hand_n = hand->force_hand_n.norm();
   budget_->setRange(0, kWhole);
   budget_->setValue(static_cast<int>(std::lround(kWhole * std::min(1.0, hand_n / hand->device_holds_n))));
-  budget_words_->setText(tr("The bone gives %1 N, the hand gets %2 N, the device holds %3 N.")
+  budget_words_->setText(tr("Force of the bone: %1 N. On the hand: %2 N. The device can hold: %3 N.")
                              .arg(number(bone_n, 1), number(hand_n, 1), number(hand->device_holds_n, 1)));
 }
 

@@ -642,7 +642,7 @@ void MainWindow::showEvent(QShowEvent* event) {
 void MainWindow::choose_risk_limit() {
   bool ok = false;
   const double limit_mm =
-      QInputDialog::getDouble(this, tr("Structures at risk"), tr("Warn when the tip is nearer than, mm"),
+      QInputDialog::getDouble(this, tr("Structures at risk"), tr("Warn when the tip is nearer than (mm):"),
                               risk_->limit_mm(), 0.0, kMostRiskLimit_mm, 1, &ok);
   if (ok) risk_->set_limit_mm(limit_mm);
 }

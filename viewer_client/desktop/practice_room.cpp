@@ -108,6 +108,12 @@ void PracticeRoom::start_haptic() {
 void PracticeRoom::start_audio() {
   audio_ = std::make_unique<ChildProcess>(log_file("osteon-audio"));
   connect(audio_.get(), QOverload<int, QProcess::ExitStatus>::of(&QProcess::finished), this, [this] { audio_ended(); });
+  connect(audio_.get(), &QProcess::errorOccurred, this, [this](QProcess::ProcessError error) {
+    if (error != QProcess::FailedToStart) return;
+    audio_past_.given_up = true;
+    audio_past_.why = tr("osteon-audio is not installed. Install the package osteon.");
+    events_.notice(tr("There is no sound: %1").arg(audio_past_.why));
+  });
   audio_->start(program_path("osteon-audio"), {"--server", address_, "--plain", "--output", "pulse", "--window",
                                                text_of(options_.sound_socket), "--timeout", "60"});
   QTimer::singleShot(kSettled_ms, audio_.get(), [this] { audio_deaths_ = 0; });
@@ -115,6 +121,11 @@ void PracticeRoom::start_audio() {
 
 void PracticeRoom::want_sound() {
   options_.sound = true;
+  if (audio_past_.given_up) {  // whoever switches the sound on again wants another attempt
+    audio_past_.given_up = false;
+    audio_deaths_ = 0;
+    audio_.reset();
+  }
   if (!audio_ && !address_.isEmpty()) start_audio();
 }
 

@@ -443,11 +443,19 @@ auto RoomSubscription::Impl::read_once(OnceCall<Request, Response> call)
     if (!outcome) return tl::unexpected(outcome.error());
     if (ended.ok()) return whole.finish();
     if (ended.error_code() == grpc::StatusCode::UNIMPLEMENTED) return {};  // an older server
-    if (ended.error_code() != grpc::StatusCode::UNAVAILABLE && ended.error_code() != grpc::StatusCode::INVALID_ARGUMENT)
+    // A restarted server knows the author no more, until the mesh thread has joined anew. With tickets it says so by
+    // PERMISSION_DENIED, without them by INVALID_ARGUMENT.
+    const bool denied = ended.error_code() == grpc::StatusCode::PERMISSION_DENIED;
+    if (!denied && ended.error_code() != grpc::StatusCode::UNAVAILABLE &&
+        ended.error_code() != grpc::StatusCode::INVALID_ARGUMENT)
       return failure(ErrorCode::unavailable, ended.error_message());
     MutexLock lock(mutex);
-    changed.wait_for(lock, std::chrono::seconds(1), [&]() OSTEON_REQUIRES(mutex) { return ending || failed; });
+    const auto over = [&]() OSTEON_REQUIRES(mutex) {
+      return ending || failed || (denied && joined.author.value != author);
+    };
+    changed.wait_for(lock, denied ? options.patience : std::chrono::milliseconds(1000), over);
     if (failed) return {};
+    if (denied && joined.author.value == author) return failure(ErrorCode::unavailable, ended.error_message());
   }
   return {};
 }

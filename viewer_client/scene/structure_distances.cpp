@@ -46,24 +46,28 @@ StructureDistances::StructureDistances(std::shared_ptr<const SurgicalPlan> plan)
   for (std::size_t s = 0; s < plan_->structures.size(); ++s) {
     if (!plan_->structures[s].at_risk()) continue;
     const TriangleMesh& mesh = plan_->structures[s].surface;
+    AtRisk& at_risk = at_risk_.emplace_back(AtRisk{s, {}, {}});
     for (std::size_t first = 0; first < mesh.triangles.size(); first += kGroup) {
-      Group group{s, first, std::min(first + kGroup, mesh.triangles.size()), {}};
+      Group group{first, std::min(first + kGroup, mesh.triangles.size()), {}};
       for (std::size_t i = group.first; i < group.last; ++i)
         for (const Vec3& corner : corners_of(mesh, i)) group.box.include(corner);
-      groups_.push_back(group);
+      at_risk.box.include(group.box.min_mm);
+      at_risk.box.include(group.box.max_mm);
+      at_risk.groups.push_back(group);
     }
   }
 }
 
 // Whether a line to one side leaves the closed surface an odd number of times. The line is a little aside, so that it
 // meets no edge of triangles whose corners lie on lattice lines.
-bool StructureDistances::is_inside(const Vec3& point_mm, std::size_t structure) const {
+bool StructureDistances::is_inside(const Vec3& point_mm, const AtRisk& at_risk) const {
+  if (squared_to(at_risk.box, point_mm) > 0.0) return false;
   const Vec3 from = point_mm + Vec3(0.0, 1.2345e-5, 2.3456e-5);
-  const TriangleMesh& mesh = plan_->structures[structure].surface;
+  const TriangleMesh& mesh = plan_->structures[at_risk.structure].surface;
   bool inside = false;
-  for (const Group& group : groups_) {
-    if (group.structure != structure || from.x() > group.box.max_mm.x() || from.y() < group.box.min_mm.y() ||
-        from.y() > group.box.max_mm.y() || from.z() < group.box.min_mm.z() || from.z() > group.box.max_mm.z())
+  for (const Group& group : at_risk.groups) {
+    if (from.x() > group.box.max_mm.x() || from.y() < group.box.min_mm.y() || from.y() > group.box.max_mm.y() ||
+        from.z() < group.box.min_mm.z() || from.z() > group.box.max_mm.z())
       continue;
     for (std::size_t i = group.first; i < group.last; ++i) {
       const auto at = corners_of(mesh, i);
@@ -83,20 +87,23 @@ std::optional<NearestStructure> StructureDistances::nearest(const Vec3& point_mm
   double least = std::numeric_limits<double>::infinity();
   std::optional<NearestStructure> found;
   // A structure around the point is nearer than all others.
-  for (std::size_t s = 0; s < plan_->structures.size(); ++s)
-    if (plan_->structures[s].at_risk() && is_inside(point_mm, s)) found = NearestStructure{s, 0.0, true, point_mm};
-  for (const Group& group : groups_) {
-    if ((found && found->inside && group.structure != found->structure) || squared_to(group.box, point_mm) >= least)
+  for (const AtRisk& at_risk : at_risk_)
+    if (is_inside(point_mm, at_risk)) found = NearestStructure{at_risk.structure, 0.0, true, point_mm};
+  for (const AtRisk& at_risk : at_risk_) {
+    if ((found && found->inside && at_risk.structure != found->structure) || squared_to(at_risk.box, point_mm) >= least)
       continue;
-    const TriangleMesh& mesh = plan_->structures[group.structure].surface;
-    for (std::size_t i = group.first; i < group.last; ++i) {
-      const auto at = corners_of(mesh, i);
-      const auto [squared, corners] = distance_to_triangle<double>(point_mm, at[0], at[1], at[2]);
-      if (squared >= least) continue;
-      least = squared;
-      const bool inside = found && found->inside;
-      found = NearestStructure{group.structure, inside ? 0.0 : std::sqrt(squared), inside,
-                               nearest_point(point_mm, at, corners)};
+    const TriangleMesh& mesh = plan_->structures[at_risk.structure].surface;
+    for (const Group& group : at_risk.groups) {
+      if (squared_to(group.box, point_mm) >= least) continue;
+      for (std::size_t i = group.first; i < group.last; ++i) {
+        const auto at = corners_of(mesh, i);
+        const auto [squared, corners] = distance_to_triangle<double>(point_mm, at[0], at[1], at[2]);
+        if (squared >= least) continue;
+        least = squared;
+        const bool inside = found && found->inside;
+        found = NearestStructure{at_risk.structure, inside ? 0.0 : std::sqrt(squared), inside,
+                                 nearest_point(point_mm, at, corners)};
+      }
     }
   }
   return found;

@@ -17,8 +17,8 @@ struct NearestStructure {
   Vec3 point_mm = Vec3::Zero();  // the nearest point of its surface, bone frame
 };
 
-// Distances to the triangles of the surfaces are exact. The surfaces are at most half a voxel from those of the labels
-// (common/surface/label_surface.hpp).
+// For one thread at a time. Points are in the bone's frame, mm. Distances to the triangles of the surfaces are exact.
+// The surfaces are at most half a voxel from those of the labels (common/surface/label_surface.hpp).
 class StructureDistances {
  public:
   explicit StructureDistances(std::shared_ptr<const SurgicalPlan> plan);  // shared with the picture
@@ -30,14 +30,19 @@ class StructureDistances {
  private:
   // Some neighbouring triangles of a structure, and the box around them.
   struct Group {
-    std::size_t structure;
     std::size_t first, last;  // triangles, without `last`
     Box box;
   };
-  [[nodiscard]] bool is_inside(const Vec3& point_mm, std::size_t structure) const;
+  // A structure at risk, its groups, and the box around it.
+  struct AtRisk {
+    std::size_t structure;
+    std::vector<Group> groups;
+    Box box;
+  };
+  [[nodiscard]] bool is_inside(const Vec3& point_mm, const AtRisk& at_risk) const;
 
   std::shared_ptr<const SurgicalPlan> plan_;
-  std::vector<Group> groups_;
+  std::vector<AtRisk> at_risk_;
 };
 
 }  // namespace osteon

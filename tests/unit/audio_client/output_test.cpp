@@ -103,7 +103,7 @@ TEST(VolumeRamp, AConstantFollowsAStraightLineFromOneVolumeToTheNext) {
   for (const double rate_hz : {44100.0, 48000.0}) {
     VolumeRamp ramp(rate_hz);
     double factor = 1.0;
-    for (const double wanted : {0.0, 1.0, 0.25, 0.75, 0.75}) {
+    for (const double wanted : {1.0, 0.0, 1.0, 0.25, 0.75, 0.75}) {
       std::vector<float> mono(4096, 1.0F);
       // In two buffers: a ramp goes on where the one before ended.
       ramp.apply(std::span(mono).first(100), wanted);
@@ -134,6 +134,14 @@ TEST(VolumeRamp, ASineHasNoStepBeyondItsOwnAndTheRamps) {
     largest = std::max(largest, static_cast<double>(std::abs(mono[i] - mono[i - 1])));
   EXPECT_LE(largest, kAmplitude * (2.0 * std::sin(kPi * kSine_hz / kRate_hz) + 1.0 / (0.03 * kRate_hz)) + 1e-6);
   EXPECT_GT(largest, 0.0);
+}
+
+// A device that appears while the sound is off.
+TEST(VolumeRamp, AnythingThatBeginsWithTheSoundOffIsSilent) {
+  VolumeRamp ramp(48000.0);
+  std::vector<float> mono(256, 1.0F);
+  ramp.apply(mono, 0.0);
+  for (const float x : mono) ASSERT_EQ(x, 0.0F);
 }
 
 TEST(SoundEngine, TheListenerHearsTheVolumeAndSeesWhatWasPlayed) {

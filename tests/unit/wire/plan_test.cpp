@@ -89,8 +89,22 @@ TEST(DensityMessages, BringTheWholeDensityAndNothingWrong) {
   auto pitches = messages;
   pitches[1].set_pitch_mm(0.6);
   EXPECT_FALSE(read(pitches));
-  for (auto& message : pitches) message.set_pitch_mm(0.0);
-  EXPECT_FALSE(read(pitches));
+  for (const double pitch_mm : {0.0, 1e-300, 1e300, double{NAN}}) {
+    for (auto& message : pitches) message.set_pitch_mm(pitch_mm);
+    EXPECT_FALSE(read(pitches)) << pitch_mm;
+  }
+  auto endless = messages;
+  endless.push_back(messages.back());
+  EXPECT_FALSE(read(endless));
+  auto empty = messages;
+  empty[1].clear_leaves();
+  EXPECT_FALSE(read(empty));
+  auto twice = messages;
+  *twice[1].mutable_leaves(0) = messages[0].leaves(0);
+  EXPECT_FALSE(read(twice));
+  auto far_away = messages;
+  far_away[0].mutable_leaves(0)->mutable_leaf()->set_x(1 << 30);
+  EXPECT_FALSE(read(far_away));
 }
 
 TEST(PlanMessages, AnUnknownKindMayBeAtRisk) {
@@ -117,6 +131,11 @@ TEST(PlanMessages, WrongOnesAreRefused) {
       [](Messages& m) { m[0].mutable_axes(0)->mutable_direction()->set_x(1.0); },
       [](Messages& m) { m[0].mutable_planes(0)->mutable_point_mm()->set_z(INFINITY); },
       [](Messages& m) { m[0].mutable_boxes(0)->mutable_max_mm()->set_y(NAN); },
+      [](Messages& m) { m[0].mutable_boxes(0)->mutable_max_mm()->set_y(-2.5); },
+      [](Messages& m) { m.push_back(m.back()); },
+      [](Messages& m) { m.insert(m.begin() + 1, v1::GetPlanResponse()); },
+      [](Messages& m) { m[1].add_parts()->set_structure(0); },
+      [](Messages& m) { *m[1].add_axes() = m[0].axes(0); },
       [](Messages& m) {
         for (int i = 0; i < 1000; ++i) *m[0].add_axes() = m[0].axes(0);
       },

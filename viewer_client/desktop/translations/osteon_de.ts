@@ -125,7 +125,7 @@
         <translation>ausgeschaltet</translation>
     </message>
     <message>
-        <source>%1 late</source>
+        <source>delay %1</source>
         <translation>%1 später</translation>
     </message>
     <message>
@@ -149,7 +149,7 @@
         <translation>Warten Sie einige Sekunden: Das Haptikprogramm bereitet die Werkzeuge vor.</translation>
     </message>
     <message>
-        <source>The haptic client is silent. End what else keeps this computer busy.</source>
+        <source>The haptic client is silent. Close other programs that use the processor.</source>
         <translation>Das Haptikprogramm schweigt. Beenden Sie, was den Rechner sonst auslastet.</translation>
     </message>
     <message>
@@ -169,7 +169,7 @@
         <translation>Sie sehen zu.</translation>
     </message>
     <message>
-        <source>You are a guest with a view.</source>
+        <source>You joined this room as a viewer.</source>
         <translation>Sie sind Gast und sehen zu.</translation>
     </message>
     <message>
@@ -205,7 +205,7 @@
         <translation>%1 auf %2</translation>
     </message>
     <message>
-        <source>Nothing. All works.</source>
+        <source>Nothing: everything works.</source>
         <translation>Nichts. Alles arbeitet.</translation>
     </message>
     <message>
@@ -213,7 +213,7 @@
         <translation>neu gestartet: %1</translation>
     </message>
     <message>
-        <source>heard %1 ms ago</source>
+        <source>last message %1 ms ago</source>
         <translation>gehört vor %1 ms</translation>
     </message>
 </context>
@@ -240,7 +240,7 @@
         <translation>Das Gerät hält diese Kraft nicht: Der Knochen ist härter, als er sich anfühlt.</translation>
     </message>
     <message>
-        <source>The bone gives %1 N, the hand gets %2 N, the device holds %3 N.</source>
+        <source>Force of the bone: %1 N. On the hand: %2 N. The device can hold: %3 N.</source>
         <translation>Der Knochen gibt %1 N, die Hand bekommt %2 N, das Gerät hält %3 N.</translation>
     </message>
     <message>
@@ -788,7 +788,7 @@
         <translation>Gefährdete Strukturen</translation>
     </message>
     <message>
-        <source>Warn when the tip is nearer than, mm</source>
+        <source>Warn when the tip is nearer than (mm):</source>
         <translation>Warnen, wenn die Spitze näher ist als, mm</translation>
     </message>
 </context>
@@ -825,6 +825,10 @@
     <message>
         <source>There is no sound: %1</source>
         <translation>Es gibt keinen Ton: %1</translation>
+    </message>
+    <message>
+        <source>osteon-audio is not installed. Install the package osteon.</source>
+        <translation>osteon-audio ist nicht installiert. Installieren Sie das Paket osteon.</translation>
     </message>
 </context>
 <context>
