@@ -516,7 +516,7 @@ TEST_F(WindowTest, TheConnectionPanelSaysWhatRunsAndWhatWasStartedAgain) {
       << label("link_server").toStdString();
   EXPECT_EQ(label("link_role"), "You practise alone.");
   EXPECT_EQ(label("link_room"), label("connection").section(' ', -1)) << "the address of the status bar";
-  EXPECT_TRUE(until([&] { return label("link_haptic").startsWith("runs, heard "); }));
+  EXPECT_TRUE(until([&] { return label("link_haptic").startsWith("runs, last message "); }));
   // The device is where the tool is.
   click_tool("drill");
   hover(middle());
