@@ -355,11 +355,11 @@ Vec3 HapticLoop::cue_n(const LoopReport& report, double limit_n, bool safe) noex
     cue_phase_ = 0.0;  // the next vibration begins without a step
     return Vec3::Zero();
   }
-  cue_phase_ = std::fmod(cue_phase_ + kCue_hz * params_.dt_s, 1.0);
   const double feed = std::max(0.0, report.cutting.feed_mm_per_s);
   const double amplitude_n = ramp_ * motor_.open() * params_.cue_n * std::min(1.0, limit_n / params_.continuous_n) *
                              feed / (feed + kHalfCue_mm_per_s);
   const double now_n = amplitude_n * std::sin(2.0 * std::numbers::pi * cue_phase_);
+  cue_phase_ = std::fmod(cue_phase_ + kCue_hz * params_.dt_s, 1.0);
   return to_device(now_n * report.pose_bone_proxy.direction(Vec3::UnitZ()));
 }
 

@@ -297,8 +297,7 @@ SessionTick PointerSession::tick(const Patch& patch, RoomLink room, int periods,
       phase_ >= PointerPhase::pushes ? (state.pose_bone_tool.position_mm - pushed_from_mm_).dot(hand_.axis) : 0.0;
   state.on_metal = (last_.events & kOnMetal) != 0;
   state.device_holds_n = device_.limits().continuous_n;
-  // It holds its peak for moments only.
-  // An instructor's limit may be lower. Then the device is not the reason.
+  // The device shows its peak for moments only. An instructor's lower limit is not the device's fault.
   state.saturated = last_.device.force_n.norm() > 0.999 * state.device_holds_n;
   state.tool = last_.tool;
   exchange_.states.publish();

@@ -24,7 +24,7 @@ namespace {
 using PlanMessages = std::vector<Bytes>;
 
 // What was sent of the newest cases, for their next viewers. A case that cannot be sent is remembered too, so that
-// asking again costs nothing. [thread for plans]
+// asking again costs nothing. Made on the thread for plans; after that has ended, on any thread.
 class SentCases {
  public:
   // `make`: what is sent of a case.
@@ -33,12 +33,16 @@ class SentCases {
   explicit SentCases(Make make) : make_(std::move(make)) {}
 
   Messages get(const KnownCase& served, const Case& bone) {
-    const auto known = std::ranges::find(cases_, served.hash, &Sent::hash);
-    if (known != cases_.end()) return known->messages;
+    {
+      const MutexLock lock(mutex_);
+      const auto known = std::ranges::find(cases_, served.hash, &Sent::hash);
+      if (known != cases_.end()) return known->messages;
+    }
     Result<PlanMessages> made = make_(served, bone);
     // A disk that cannot be read now may be readable later.
     if (!made && made.error().code != ErrorCode::exhausted && made.error().code != ErrorCode::invalid_input)
       return tl::unexpected(made.error());
+    const MutexLock lock(mutex_);
     if (cases_.size() == kMostCases) cases_.pop_front();
     cases_.push_back({served.hash, made ? Messages(std::make_shared<const PlanMessages>(std::move(*made)))
                                         : Messages(tl::unexpected(made.error()))});
@@ -52,7 +56,8 @@ class SentCases {
     Messages messages;  // shared with the streams that send them
   };
   const Make make_;
-  std::deque<Sent> cases_;  // oldest first
+  Mutex mutex_{LockRank::leaf};
+  std::deque<Sent> cases_ OSTEON_GUARDED_BY(mutex_);  // oldest first
 };
 
 template <class Message>

@@ -193,6 +193,7 @@ void BoneView::clip(const Clipping& visible) {
 bool BoneView::set_stereo(StereoMode mode) {
   const bool has = scene_->set_stereo(mode);
   stereo_ = scene_->stereo();
+  if (whole_) look_whole(camera());  // each picture has half of the width side by side
   redraw();
   return has;
 }

@@ -41,7 +41,7 @@ OverseenHand::OverseenHand(const OverseenRun& run)
       room_(bone_, run.delay_ms),
       rotation_(Eigen::Quaterniond::Identity()) {
   const SimulatedDeviceParams device = run.weak ? *find_simulated_device("simulated-3.3N") : SimulatedDeviceParams{};
-  LoopParams params = loop_params(device.limits, 0.0);
+  LoopParams params = loop_params(device.limits, {0.0, run.choice});
   params.ramp_s = 1e-9;
   params.slew_n_per_ms = run.slew_n_per_ms;
   loop_ =

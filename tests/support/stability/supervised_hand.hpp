@@ -23,6 +23,7 @@ struct OverseenRun {
   bool weak = false;           // a device of 3.3 N with half of its stiffness, on a workspace of another size
   double slew_n_per_ms = 0.5;  // of the loop
   bool mount = false;          // the bone yields
+  haptic::ForceChoice choice = haptic::ForceChoice::proportional;
 };
 
 // Number of interventions while the tool touched bone.

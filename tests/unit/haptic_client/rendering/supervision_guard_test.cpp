@@ -247,6 +247,38 @@ TEST_P(Overseen, FeelsAndCutsWithNoMoreThanItsLimit) {
   check("limited", hand.crossed());
 }
 
+// The vibration of the feed cue is at most its own part of the device's force, times v / (v + 1 mm/s), and smaller in
+// the proportion in which the limit lowers the shown force.
+TEST(FeedCue, ShrinksWithAnInstructorsLimit) {
+  Pressed pressed({.tool = "drill-3.2", .weak = true, .choice = ForceChoice::feed_cue});
+  OverseenHand& hand = pressed.hand;
+  const LoopParams& params = hand.loop().params();
+  // The largest vibration, as a share of its whole part at the feed of that moment.
+  const auto largest_share = [&] {
+    double largest = 0.0;
+    for (int i = 0; i < 1000; ++i) {
+      pressed.work(1);
+      const double feed = std::max(0.0, hand.last().cutting.feed_mm_per_s),
+                   whole_n = params.cue_n * feed / (feed + 1.0);
+      if (whole_n > 1e-6) largest = std::max(largest, hand.last().cue.device_n.norm() / whole_n);
+    }
+    return largest;
+  };
+  ASSERT_TRUE(pressed.work(2000));
+  const double felt_n = hand.last().coupling.force_n.norm();
+  EXPECT_GT(largest_share(), 0.9);
+  Restrictions limited;
+  limited.force_limit = static_cast<int>(50.0 * felt_n);  // half of that
+  hand.decide(limited);
+  pressed.work(400);  // the limit falls slowly
+  const double knee_n = params.compression.knee_n;
+  const double share = params.force_scale * knee_n * std::log1p(limited.force_limit_n() / knee_n) / params.continuous_n;
+  ASSERT_LT(share, 0.8) << "the test would prove nothing";
+  const double largest = largest_share();
+  EXPECT_GT(largest, 0.9 * share);
+  EXPECT_LE(largest, share + 1e-6);
+}
+
 using Case = std::tuple<const char*, int, bool>;
 INSTANTIATE_TEST_SUITE_P(Tools, Overseen,
                          ::testing::Values(Case("burr-round-5", 0, false), Case("burr-round-5", 50, true),
