@@ -219,7 +219,7 @@ TEST_F(WindowTest, WheelSpaceAndShiftSetPushSpindleAndFineMotion) {
 
 // A picture costs much of a processor where software draws it.
 TEST_F(WindowTest, ARestingToolIsNotDrawnAgainAndAgain) {
-  constexpr std::uint64_t kStates = 60, kMostFrames = 3;
+  constexpr std::uint64_t kStates = 1000, kMostFrames = 3;
   open();
   click_tool("drill");
   hover(middle());
