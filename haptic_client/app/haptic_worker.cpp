@@ -55,7 +55,8 @@ void HapticWorker::tick(int periods, std::int64_t woke_ns) {
   supervise();
   const RoomLink room = over ? RoomLink::over : follows ? RoomLink::follows : RoomLink::held;
   move_bone();
-  const SessionTick now = session_.tick(exchange_.patches.value(), room, periods, &exchange_.guides.value());
+  const int periods_of_hand = session_.simulated_time() ? 1 : periods;
+  const SessionTick now = session_.tick(exchange_.patches.value(), room, periods_of_hand, &exchange_.guides.value());
   last_ = now.report;
   exchange_.items_left.store(session_.left().size(), std::memory_order_release);
 

@@ -23,6 +23,8 @@ class Session {
                            const std::vector<PlacedGuide>* room_guides = nullptr) noexcept = 0;
   [[nodiscard]] virtual bool done() const noexcept = 0;
   [[nodiscard]] virtual bool endless() const noexcept { return false; }  // continues until it is asked to stop
+  // True: no time passes for the hand between two ticks, so that no tick is late for it.
+  [[nodiscard]] virtual bool simulated_time() const noexcept { return false; }
   [[nodiscard]] virtual HapticLoop& loop() noexcept = 0;
   // Its steps and tools; a free hand has tools only.
   [[nodiscard]] virtual const ReadyPlan& plan() const noexcept = 0;
@@ -45,6 +47,8 @@ class SimulatedSession final : public Session {
   // True when the plan is done, or when the recording being played is over and nobody moves the handle. Steps that need
   // no handle are completed first: the way out of the bone, the spindle's stop, a wait.
   [[nodiscard]] bool done() const noexcept override;
+  // False while a recording is played: its device may have its own time.
+  [[nodiscard]] bool simulated_time() const noexcept override { return !played_; }
   // Call before the first tick. This device then moves the handle, and the simulated hand lets go. The plan still says
   // which tools are taken up when. The same cuts and forces are repeated, bit for bit, under these conditions. The
   // recording has the same plan and force scale, and the bone is as it was then. Patches, confirmed cuts, late ticks

@@ -3,6 +3,10 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <chrono>
+#include <thread>
+
 #include "tests/support/allocation_counter.hpp"
 #include "tests/unit/haptic_client/app/fake_room.hpp"
 #include "tests/unit/haptic_client/bench.hpp"
@@ -21,6 +25,31 @@ struct HapticRun {
   ClientEnd end;
   StopSignal stop;
   HapticWorker worker{session, Vec3::Zero(), exchange, end, stop};
+};
+
+// A session whose third tick stalls for 20 ms. So the fourth is late by about 20 periods.
+class StallingSession final : public Session {
+ public:
+  StallingSession(Session& inner, bool simulated_time) : inner_(inner), simulated_time_(simulated_time) {}
+  SessionTick tick(const Patch& patch, RoomLink room, int periods,
+                   const std::vector<PlacedGuide>* room_guides) noexcept override {
+    longest_wait_ = std::max(longest_wait_, periods);
+    if (++ticks_ == 3) std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    return inner_.tick(patch, room, periods, room_guides);
+  }
+  [[nodiscard]] bool simulated_time() const noexcept override { return simulated_time_; }
+  [[nodiscard]] bool done() const noexcept override { return inner_.done(); }
+  [[nodiscard]] HapticLoop& loop() noexcept override { return inner_.loop(); }
+  [[nodiscard]] const ReadyPlan& plan() const noexcept override { return inner_.plan(); }
+  [[nodiscard]] const std::vector<StepResult>& results() const noexcept override { return inner_.results(); }
+  [[nodiscard]] const std::vector<LeftItem>& left() const noexcept override { return inner_.left(); }
+  [[nodiscard]] const HapticDevice& device() const noexcept override { return inner_.device(); }
+  [[nodiscard]] int longest_wait() const { return longest_wait_; }  // ms, as the session was told
+
+ private:
+  Session& inner_;
+  bool simulated_time_;
+  int ticks_ = 0, longest_wait_ = 0;
 };
 
 std::vector<TickRow> rows_of(WorkerExchange& exchange) {
@@ -56,6 +85,21 @@ TEST(HapticWorker, RunsDownForHalfASecondAfterTheClientsEnd) {
   ASSERT_EQ(rows.size(), 500u);
   for (const TickRow& row : rows) EXPECT_TRUE(row.report.events & kRoomHeld);
   EXPECT_EQ(rows.back().force_rendered_n, 0.0);
+}
+
+TEST(HapticWorker, CountsLateTicksForADeviceButNotForASimulatedHand) {
+  for (const bool simulated_time : {false, true}) {
+    const auto run = std::make_unique<HapticRun>(std::vector{wait_for(0.05)});
+    EXPECT_TRUE(run->session.simulated_time());
+    StallingSession session(run->session, simulated_time);
+    HapticWorker worker(session, Vec3::Zero(), run->exchange, run->end, run->stop);
+    worker.run();
+    EXPECT_GE(worker.outcome().ticks.missed, 15u) << "the machine did stall";
+    if (simulated_time)
+      EXPECT_EQ(session.longest_wait(), 1);
+    else
+      EXPECT_GE(session.longest_wait(), 15);
+  }
 }
 
 TEST(HapticWorker, HoldsTheSpindleWhileTheRoomDoesNotFollow) {
