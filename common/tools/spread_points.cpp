@@ -1,13 +1,14 @@
 #include "common/tools/spread_points.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <limits>
 #include <numbers>
 #include <numeric>
 #include <optional>
-#include <unordered_map>
+#include <utility>
 
 namespace osteon {
 namespace {
@@ -39,44 +40,113 @@ std::optional<Candidate> settled(const Implicit& solid, Vec3 p) {
   return Candidate{p, outward, on_edge};
 }
 
-// Kept points in cells as wide as the radius. Near points are in the 27 cells around.
-class Neighbours {
+// Finds candidates near a place: a box of cells at least as wide as the reach. What is within reach of a place lies in
+// the 27 cells around it.
+class NearCandidates {
  public:
-  Neighbours(const std::vector<Candidate>& all, double cell_mm) : all_(all), cell_(cell_mm) {}
-  void add(std::uint32_t index) { cells_[cell_of(all_[index].point)].push_back(index); }
-  [[nodiscard]] bool taken(const Candidate& candidate, double radius_mm) const {
-    const Coord middle = cell_of(candidate.point);
-    for (int i = 0; i < 27; ++i) {
-      const auto found = cells_.find(middle + Coord{i / 9 - 1, i / 3 % 3 - 1, i % 3 - 1});
-      if (found == cells_.end()) continue;
-      for (const std::uint32_t index : found->second)
-        if ((all_[index].point - candidate.point).squaredNorm() < radius_mm * radius_mm &&
-            all_[index].outward.dot(candidate.outward) > kOtherSide)
-          return true;
+  NearCandidates(const std::vector<Candidate>& all, double reach_mm) : all_(all), cell_mm_(reach_mm) {
+    Vec3 most = all.front().point;
+    least_ = most;
+    for (const Candidate& candidate : all) {
+      least_ = least_.cwiseMin(candidate.point);
+      most = most.cwiseMax(candidate.point);
     }
+    const Vec3 size = most - least_;
+    // A long thin tool with a small reach must not need more memory than this.
+    constexpr double kMostCells = 1 << 20;
+    const auto cells = [&](int axis) { return std::floor(size[axis] / cell_mm_) + 3.0; };
+    while (cells(0) * cells(1) * cells(2) > kMostCells) cell_mm_ *= 1.25;
+    // A margin of one cell on either side, so that each cell of a candidate has 26 neighbours.
+    for (int axis = 0; axis < 3; ++axis) cells_[static_cast<std::size_t>(axis)] = static_cast<std::size_t>(cells(axis));
+    first_.assign(cells_[0] * cells_[1] * cells_[2], kNone);
+    next_.assign(all.size(), kNone);
+  }
+  void add(std::uint32_t index) {
+    std::uint32_t& first = first_[cell_of(all_[index].point)];
+    next_[index] = std::exchange(first, index);
+  }
+  // Calls `visit(index)` for each added candidate in the 27 cells until it returns true. Returns whether it did.
+  template <class Visit>
+  bool any(const Vec3& p, const Visit& visit) const {
+    const std::size_t corner = cell_of(p) - (cells_[1] + 1) * cells_[2] - 1;
+    for (std::size_t x = 0; x < 3; ++x)
+      for (std::size_t y = 0; y < 3; ++y)
+        for (std::size_t z = 0; z < 3; ++z)
+          for (std::uint32_t i = first_[corner + (x * cells_[1] + y) * cells_[2] + z]; i != kNone; i = next_[i])
+            if (visit(i)) return true;
     return false;
   }
+  [[nodiscard]] double reach_mm() const { return cell_mm_; }
 
  private:
-  [[nodiscard]] Coord cell_of(const Vec3& p) const {
-    return {static_cast<std::int32_t>(std::floor(p.x() / cell_)), static_cast<std::int32_t>(std::floor(p.y() / cell_)),
-            static_cast<std::int32_t>(std::floor(p.z() / cell_))};
+  static constexpr std::uint32_t kNone = ~0u;
+  [[nodiscard]] std::size_t cell_of(const Vec3& p) const {
+    const Vec3 at = (p - least_) / cell_mm_;
+    const auto along = [&](int axis) { return static_cast<std::size_t>(at[axis]) + 1; };
+    return (along(0) * cells_[1] + along(1)) * cells_[2] + along(2);
   }
+
   const std::vector<Candidate>& all_;
-  double cell_;
-  std::unordered_map<Coord, std::vector<std::uint32_t>, CoordHash> cells_;
+  double cell_mm_;
+  Vec3 least_;
+  std::array<std::size_t, 3> cells_{};
+  std::vector<std::uint32_t> first_, next_;
 };
+
+bool same_side(const Candidate& a, const Candidate& b) { return a.outward.dot(b.outward) > kOtherSide; }
 
 std::vector<std::uint32_t> kept_at(const std::vector<Candidate>& candidates, const std::vector<std::uint32_t>& order,
                                    double radius_mm) {
   std::vector<std::uint32_t> kept;
-  Neighbours near(candidates, radius_mm);
-  for (const std::uint32_t index : order)
-    if (!candidates[index].on_edge && !near.taken(candidates[index], radius_mm)) {
-      near.add(index);
-      kept.push_back(index);
-    }
+  NearCandidates near(candidates, radius_mm);
+  for (const std::uint32_t index : order) {
+    const Candidate& candidate = candidates[index];
+    if (candidate.on_edge) continue;
+    const bool taken = near.any(candidate.point, [&](std::uint32_t other) {
+      return (candidates[other].point - candidate.point).squaredNorm() < radius_mm * radius_mm &&
+             same_side(candidates[other], candidate);
+    });
+    if (taken) continue;
+    near.add(index);
+    kept.push_back(index);
+  }
   return kept;
+}
+
+// The kept candidate that each candidate belongs to: the nearest one on its side of something thin, the first in `kept`
+// of equals. One on the other side only where its own side has none.
+std::vector<std::size_t> owners(const std::vector<Candidate>& candidates, const std::vector<std::uint32_t>& kept,
+                                double radius_mm) {
+  std::vector<std::size_t> rank(candidates.size());
+  NearCandidates near(candidates, radius_mm);
+  for (std::size_t i = 0; i < kept.size(); ++i) {
+    rank[kept[i]] = i;
+    near.add(kept[i]);
+  }
+  std::vector<std::size_t> result;
+  result.reserve(candidates.size());
+  for (const Candidate& candidate : candidates) {
+    double nearest = std::numeric_limits<double>::infinity();
+    std::size_t owner = 0;
+    const auto consider = [&](std::size_t i, bool other_side) {
+      constexpr double kFar_mm2 = 1e6;
+      const double distance =
+          (candidates[kept[i]].point - candidate.point).squaredNorm() + (other_side ? kFar_mm2 : 0.0);
+      if (distance < nearest || (distance == nearest && i < owner)) {
+        nearest = distance;
+        owner = i;
+      }
+    };
+    near.any(candidate.point, [&](std::uint32_t other) {
+      if (same_side(candidates[other], candidate)) consider(rank[other], false);
+      return false;
+    });
+    // A nearer one can only be in those cells if this one is within their reach.
+    if (nearest >= near.reach_mm() * near.reach_mm())
+      for (std::size_t i = 0; i < kept.size(); ++i) consider(i, !same_side(candidates[kept[i]], candidate));
+    result.push_back(owner);
+  }
+  return result;
 }
 
 }  // namespace
@@ -143,20 +213,7 @@ std::vector<SamplePoint> spread_points(const Implicit& solid, const TriangleMesh
   for (const std::uint32_t index : kept)
     points.push_back({candidates[index].point, -candidates[index].outward, 0.0, false});
   const double share = area / static_cast<double>(candidates.size());
-  for (const Candidate& candidate : candidates) {
-    double nearest = std::numeric_limits<double>::infinity();
-    SamplePoint* owner = nullptr;
-    for (SamplePoint& point : points) {
-      // A point on the other side does not represent this one while there is another.
-      const bool other_side = -point.inward.dot(candidate.outward) <= kOtherSide;
-      const double distance = (point.position_mm - candidate.point).squaredNorm() + (other_side ? 1e6 : 0.0);
-      if (distance < nearest) {
-        nearest = distance;
-        owner = &point;
-      }
-    }
-    owner->area_mm2 += share;
-  }
+  for (const std::size_t owner : owners(candidates, kept, radius)) points[owner].area_mm2 += share;
   return points;
 }
 
