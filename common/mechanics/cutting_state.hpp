@@ -25,7 +25,9 @@ struct CuttingState {
   double depth_mm = 0;  // of the tip from the entry of the step under way, along the axis of its site;
                         // negative before the bone, 0 before the first step
   CuttingPhase phase = CuttingPhase::idle;
-  bool on_metal = false;  // the spindle turns, but metal is in the way: the tool cuts nothing
+  double force_hand_N = 0;    // of the device on the user's hand; 0: also where the device shows no force
+  double device_holds_N = 0;  // the most that the device holds for long; 0: it shows no force, or nothing is known
+  bool on_metal = false;      // the spindle turns, but metal is in the way: the tool cuts nothing
 };
 
 }  // namespace osteon

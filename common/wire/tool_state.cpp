@@ -65,6 +65,8 @@ v1::ToolState to_tool_state(const CuttingState& state, std::uint32_t buttons, bo
   effort.set_density(steps<std::uint32_t>(state.density_g_cm3, 1000.0));
   effort.set_engaged(steps<std::uint32_t>(std::clamp(state.engaged_fraction, 0.0, 1.0), 1000.0));
   effort.set_depth(steps<std::int32_t>(state.depth_mm, 1024.0));
+  effort.set_force_hand(steps<std::uint32_t>(state.force_hand_N, 1000.0));
+  effort.set_device_holds(steps<std::uint32_t>(state.device_holds_N, 1000.0));
   return out;
 }
 
@@ -99,6 +101,8 @@ Result<bool> take_over(const v1::ToolState& sent, KnownToolState& known) {
     next.density_g_cm3 = effort.density() / 1000.0;
     next.engaged_fraction = effort.engaged() / 1000.0;
     next.depth_mm = effort.depth() / 1024.0;
+    next.force_hand_N = effort.force_hand() / 1000.0;
+    next.device_holds_N = effort.device_holds() / 1000.0;
   }
   known = {next, sent.buttons()};
   return true;

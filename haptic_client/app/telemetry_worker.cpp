@@ -19,7 +19,14 @@ constexpr auto kItemAgain = 2s;        // after an item was denied
 
 TelemetryWorker::TelemetryWorker(const ClientRoom& room, const Session& session, bool status, SessionLog& log,
                                  Recorder& recorder, WorkerExchange& exchange, ClientEnd& end)
-    : room_(room), session_(session), status_(status), log_(log), recorder_(recorder), exchange_(exchange), end_(end) {
+    : room_(room),
+      session_(session),
+      status_(status),
+      device_holds_n_(session.device().limits().continuous_n),
+      log_(log),
+      recorder_(recorder),
+      exchange_(exchange),
+      end_(end) {
   for (const ToolModel& model : session_.plan().tools) tool_names_.push_back(model.tool.name);
   if (tool_names_.empty()) tool_names_.emplace_back("none");
 }
@@ -128,6 +135,8 @@ CuttingState TelemetryWorker::state_of(const TickRow& row) const {
   state.depth_mm = row.depth_mm;
   state.phase = r.cutting.phase;
   state.on_metal = (r.events & kOnMetal) != 0;
+  state.device_holds_N = device_holds_n_;
+  state.force_hand_N = device_holds_n_ > 0.0 ? row.force_rendered_n : 0.0;
   return state;
 }
 

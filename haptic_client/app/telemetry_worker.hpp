@@ -50,6 +50,7 @@ class TelemetryWorker {
   const ClientRoom room_;
   const Session& session_;
   const bool status_;
+  const double device_holds_n_;  // for long; 0: the device shows no force
   SessionLog& log_;
   Recorder& recorder_;
   WorkerExchange& exchange_;

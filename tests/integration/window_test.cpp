@@ -747,6 +747,11 @@ TEST_F(WindowTest, AWindowThatWatchesFollowsTheToolAndChangesNothing) {
     return states.empty() ? 1e9 : (seen->camera().target_mm - states.front().pose_bone_tool.position_mm).norm();
   };
   EXPECT_TRUE(until([&] { return seen->updater()->surface().any_cut_face() && off_tool_mm() < 25.0; })) << problem();
+  // The instructor sees what the trainee's hand gets, and what that device can hold.
+  const auto shown = [&](const char* name) { return other.findChild<QLabel*>(name)->text(); };
+  EXPECT_TRUE(until([&] { return shown("budget_words").endsWith("The device can hold: 30.0 N."); }))
+      << shown("budget_words").toStdString();
+  EXPECT_TRUE(until([&] { return shown("force_hand").endsWith(" N"); })) << shown("force_hand").toStdString();
   // A drag frees the camera. It stays where the user put it, until T.
   QTest::mouseRelease(view_, Qt::LeftButton, {}, middle());
   other.findChild<QAction*>("overview")->trigger();

@@ -16,6 +16,7 @@ namespace osteon {
 namespace {
 
 constexpr double kShown_s = 10.0, kLeastTop = 5.0;
+constexpr double kLeastChange = 0.02;  // less than half a pixel
 
 // With the user's decimal sign, and never a negative zero.
 QString number(double value, int decimals) {
@@ -31,9 +32,16 @@ ScrollingPlot::ScrollingPlot(QWidget* parent) : QWidget(parent) {
 }
 
 void ScrollingPlot::add(double at_s, double first, double second) {
+  const auto changed = [&](double before, double now) { return std::abs(now - before) > kLeastChange; };
+  if (samples_.empty() || changed(level_first_, first) || changed(level_second_, second)) {
+    level_first_ = first;
+    level_second_ = second;
+    level_since_s_ = at_s;
+  }
   samples_.push_back({at_s, first, second});
   while (samples_.front().at_s < at_s - kShown_s) samples_.pop_front();
-  update();
+  // Each repaint composes the window's whole picture again. Level lines look the same wherever they have scrolled to.
+  if (samples_.front().at_s <= level_since_s_) update();
 }
 
 void ScrollingPlot::paintEvent(QPaintEvent*) {
@@ -112,30 +120,39 @@ GaugesPanel::GaugesPanel(QWidget* parent) : QWidget(parent) {
     keeps.setRetainSizeWhenHidden(true);
     part->setSizePolicy(keeps);
   }
-  PointerOutput any;
-  any.device_holds_n = 1.0;
-  show_budget(0.0, any);
-  show_budget(0.0, std::nullopt);
+  show_budget(HandForce{.device_holds_n = 1.0});
+  show_budget(std::nullopt);
 }
 
 void GaugesPanel::show_push(double push_n) { push_->setText(tr("%1 N").arg(number(push_n, 0))); }
 
-void GaugesPanel::show_budget(double bone_n, const std::optional<PointerOutput>& hand) {
+void GaugesPanel::show_budget(const std::optional<HandForce>& hand) {
   const bool known = hand && hand->device_holds_n > 0.0;
   budget_->setVisible(known);
   budget_words_->setVisible(known);
   saturated_->setVisible(known && hand->saturated);
   if (!known) return;
   constexpr int kWhole = 1000;
-  const double hand_n = hand->force_hand_n.norm();
   budget_->setRange(0, kWhole);
-  budget_->setValue(static_cast<int>(std::lround(kWhole * std::min(1.0, hand_n / hand->device_holds_n))));
+  budget_->setValue(static_cast<int>(std::lround(kWhole * std::min(1.0, hand->hand_n / hand->device_holds_n))));
   budget_words_->setText(tr("Force of the bone: %1 N. On the hand: %2 N. The device can hold: %3 N.")
-                             .arg(number(bone_n, 1), number(hand_n, 1), number(hand->device_holds_n, 1)));
+                             .arg(number(hand->bone_n, 1), number(hand->hand_n, 1), number(hand->device_holds_n, 1)));
 }
 
-void GaugesPanel::show(const CuttingState& state, const std::optional<PointerOutput>& hand, double at_s) {
-  const double bone_n = state.force_physical_N.norm(), hand_n = hand ? hand->force_hand_n.norm() : 0.0;
+std::optional<HandForce> hand_force(const CuttingState& state, const std::optional<PointerOutput>& output) {
+  // A device holds a little less than its limit when the loop saturates: rounding.
+  constexpr double kNearlyAll = 0.999;
+  if (output)
+    return HandForce{output->force_bone_n.norm(), output->force_hand_n.norm(), output->device_holds_n, output->depth_mm,
+                     output->saturated};
+  if (state.device_holds_N <= 0.0) return std::nullopt;
+  return HandForce{state.force_physical_N.norm(), state.force_hand_N, state.device_holds_N, state.depth_mm,
+                   state.force_hand_N > kNearlyAll * state.device_holds_N};
+}
+
+void GaugesPanel::show(const CuttingState& state, const std::optional<PointerOutput>& pointer, double at_s) {
+  const std::optional<HandForce> hand = hand_force(state, pointer);
+  const double bone_n = state.force_physical_N.norm(), hand_n = hand ? hand->hand_n : 0.0;
   bone_->setText(tr("%1 N").arg(number(bone_n, 1)));
   hand_->setText(hand ? tr("%1 N").arg(number(hand_n, 1)) : QString("–"));
   torque_->setText(tr("%1 Nmm").arg(number(state.torque_Nmm, 0)));
@@ -144,7 +161,7 @@ void GaugesPanel::show(const CuttingState& state, const std::optional<PointerOut
   feed_->setText(tr("%1 mm/s").arg(number(state.feed_mm_per_s, 1)));
   const bool in_bone = state.engaged_fraction > 0.0;
   density_->setText(in_bone ? tr("%1 g/cm³").arg(number(state.density_g_cm3, 2)) : QString("–"));
-  show_budget(hand ? hand->force_bone_n.norm() : bone_n, hand);
+  show_budget(hand);
   plot_->add(at_s, bone_n, hand_n);
 }
 

@@ -20,7 +20,7 @@ class ScrollingPlot : public QWidget {
 
  public:
   explicit ScrollingPlot(QWidget* parent = nullptr);
-  // `at_s`: on any steady clock.
+  // `at_s`: on any steady clock. The plot is not drawn again while both lines are level.
   void add(double at_s, double first, double second);
   [[nodiscard]] QSize sizeHint() const override { return {240, 110}; }
 
@@ -32,7 +32,20 @@ class ScrollingPlot : public QWidget {
     double at_s, first, second;
   };
   std::deque<Sample> samples_;
+  double level_first_ = 0, level_second_ = 0, level_since_s_ = 0;  // both have stayed near these values since then
 };
+
+// What a device shows of the bone's force.
+struct HandForce {
+  double bone_n = 0, hand_n = 0;  // what the bone gives, what the hand gets
+  double device_holds_n = 0;      // the most that the device holds for long; 0: not known
+  double depth_mm = 0;            // of the tip along its axis
+  bool saturated = false;         // the device cannot hold what it should show
+};
+
+// `output`: what the window's own pointer reported last. None: the state's device is another.
+[[nodiscard]] std::optional<HandForce> hand_force(const CuttingState& state,
+                                                  const std::optional<PointerOutput>& output);
 
 class GaugesPanel : public QWidget {
   Q_DECLARE_TR_FUNCTIONS(GaugesPanel)
@@ -40,12 +53,12 @@ class GaugesPanel : public QWidget {
  public:
   explicit GaugesPanel(QWidget* parent = nullptr);
 
-  // `hand`: what the pointer's haptic client reported last. None: another device.
-  void show(const CuttingState& state, const std::optional<PointerOutput>& hand, double at_s);
+  // `pointer`: what its haptic client reported last. None: the tool is held at another device.
+  void show(const CuttingState& state, const std::optional<PointerOutput>& pointer, double at_s);
   void show_push(double push_n);
 
  private:
-  void show_budget(double bone_n, const std::optional<PointerOutput>& hand);
+  void show_budget(const std::optional<HandForce>& hand);
   QLabel *bone_, *hand_, *torque_, *depth_, *spindle_, *feed_, *density_, *push_;
   QProgressBar* budget_;  // the force on the hand, of what the device holds for long
   QLabel *budget_words_, *saturated_;

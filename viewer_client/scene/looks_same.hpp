@@ -22,8 +22,9 @@ inline constexpr double kLongestTool_mm = 200.0;
   return a.author == b.author && a.tool_name == b.tool_name && a.phase == b.phase && a.on_metal == b.on_metal &&
          looks_same(a.pose_bone_tool, b.pose_bone_tool) && looks_same(a.pose_bone_device, b.pose_bone_device) &&
          within(a.spindle_rpm, b.spindle_rpm, 0.5) && within(a.depth_mm, b.depth_mm, 0.05) &&
-         (a.force_physical_N - b.force_physical_N).norm() <= 0.05 &&
-         within(a.engaged_fraction, b.engaged_fraction, 0.005) && within(a.density_g_cm3, b.density_g_cm3, 0.005);
+         (a.force_physical_N - b.force_physical_N).norm() <= 0.05 && within(a.force_hand_N, b.force_hand_N, 0.05) &&
+         within(a.device_holds_N, b.device_holds_N, 0.05) && within(a.engaged_fraction, b.engaged_fraction, 0.005) &&
+         within(a.density_g_cm3, b.density_g_cm3, 0.005);
 }
 
 }  // namespace osteon

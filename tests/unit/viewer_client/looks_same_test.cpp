@@ -42,6 +42,8 @@ TEST(LooksSame, WhateverAGaugeShowsCounts) {
   EXPECT_TRUE(differs([](CuttingState& s) { s.pose_bone_device.position_mm.z() += 0.01; }));
   EXPECT_TRUE(differs([](CuttingState& s) { s.spindle_rpm = 1; }));
   EXPECT_TRUE(differs([](CuttingState& s) { s.force_physical_N = {0, 0, 0.1}; }));
+  EXPECT_TRUE(differs([](CuttingState& s) { s.force_hand_N = 0.1; }));
+  EXPECT_TRUE(differs([](CuttingState& s) { s.device_holds_N = 3.3; }));
   EXPECT_TRUE(differs([](CuttingState& s) { s.depth_mm = 0.1; }));
   EXPECT_TRUE(differs([](CuttingState& s) { s.engaged_fraction = 0.01; }));
   EXPECT_TRUE(differs([](CuttingState& s) { s.density_g_cm3 = 0.01; }));

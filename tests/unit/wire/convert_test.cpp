@@ -47,12 +47,16 @@ TEST(Wire, AStateComesBack) {
   state.force_physical_N = {1, -2, 3};
   state.phase = CuttingPhase::cutting;
   state.on_metal = true;
+  state.force_hand_N = 0.5;
+  state.device_holds_N = 0.875;
   const auto back = wire::from_wire(wire::to_wire(state));
   ASSERT_TRUE(back) << back.error().message;
   EXPECT_EQ(back->state_seq, 99u);
   EXPECT_EQ(back->tool_name, "burr-round-5");
   EXPECT_EQ(back->phase, CuttingPhase::cutting);
   EXPECT_TRUE(back->on_metal);
+  EXPECT_EQ(back->force_hand_N, 0.5);
+  EXPECT_EQ(back->device_holds_N, 0.875);
   EXPECT_EQ(back->force_physical_N, state.force_physical_N);
   EXPECT_LT((back->pose_bone_tool.position_mm - state.pose_bone_tool.position_mm).norm(), 1e-9);
 }

@@ -709,6 +709,8 @@ TEST(ToolState, ComesBackWithinItsSteps) {
   state.depth_mm = -3.5;
   state.phase = CuttingPhase::cutting;
   state.on_metal = true;
+  state.force_hand_N = 3.25;
+  state.device_holds_N = 0.88;
   wire::KnownToolState known;
   const v1::ToolState full = wire::to_tool_state(state, 5, true);
   ASSERT_TRUE(wire::take_over(full, known).value());
@@ -724,6 +726,8 @@ TEST(ToolState, ComesBackWithinItsSteps) {
   EXPECT_EQ(known.state.engaged_fraction, 0.25);
   EXPECT_EQ(known.state.force_physical_N, state.force_physical_N);
   EXPECT_EQ(known.state.phase, state.phase);
+  EXPECT_EQ(known.state.force_hand_N, 3.25);
+  EXPECT_NEAR(known.state.device_holds_N, 0.88, 1e-9);
   EXPECT_LT((known.state.pose_bone_tool.position_mm - state.pose_bone_tool.position_mm).norm(), 0.001);
   EXPECT_LT(known.state.pose_bone_device.rotation.angularDistance(state.pose_bone_device.rotation), 2e-4);
   // A pose alone leaves the effort unchanged. An old state changes nothing.

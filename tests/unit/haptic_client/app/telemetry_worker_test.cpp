@@ -88,13 +88,15 @@ TEST_F(TelemetryWorkerTest, NotesWhatRestrictionsDoToTheMillisecond) {
 }
 
 TEST_F(TelemetryWorkerTest, SendsTheNewestStateOfManyRows) {
-  for (std::uint64_t seq = 1; seq <= 5; ++seq) push(seq, 0, 0.0);
+  for (std::uint64_t seq = 1; seq <= 5; ++seq) push(seq, 0, 0.5 * static_cast<double>(seq));
   exchange_.mount_loads.store(MountLoad{});
   run_to_the_end();
   ASSERT_EQ(room_.states.size(), 1u);
   EXPECT_EQ(room_.states[0].state_seq, 5u);
   EXPECT_EQ(room_.states[0].author, AuthorId{7});
   EXPECT_EQ(room_.states[0].tool_name, "drill-3.2");
+  EXPECT_EQ(room_.states[0].force_hand_N, 2.5);
+  EXPECT_EQ(room_.states[0].device_holds_N, 30.0) << "as for --device simulated";
   EXPECT_EQ(room_.loads.size(), 1u);
   EXPECT_DOUBLE_EQ(exchange_.line_lag_s, 0.04);
 }
