@@ -17,6 +17,7 @@ void DrillSynth::prepare(const SynthParams& params) {
 
 void DrillSynth::reset() noexcept {
   voices_.fill(Voice{});
+  suction_.prepare(params_.suction, params_.rate_hz, params_.seed);
   limiter_.reset();
   block_.fill(0.0F);
   used_ = kBlockFrames;
@@ -25,6 +26,8 @@ void DrillSynth::reset() noexcept {
 
 void DrillSynth::aim(const SoundScene& scene) noexcept {
   std::array<bool, kVoices> aimed{};
+  const auto tools = std::span(scene.tools).first(static_cast<std::size_t>(scene.count));
+  suction_.aim(std::ranges::any_of(tools, &ToolSound::suction));
   for (int t = 0; t < scene.count; ++t) {
     const ToolSound& tool = scene.tools[static_cast<std::size_t>(t)];
     const auto same = std::find_if(voices_.begin(), voices_.end(), [&](const Voice& v) {
@@ -64,13 +67,18 @@ void DrillSynth::render_block() noexcept {
     voice.add_to(block_);
     tail_blocks_ = 2;
   }
+  if (suction_.sounding()) {
+    suction_.add_to(block_);
+    tail_blocks_ = 2;
+  }
   limiter_.process(block_);
   tail_blocks_ = std::max(0, tail_blocks_ - 1);
   used_ = 0;
 }
 
 bool DrillSynth::silent() const noexcept {
-  return tail_blocks_ == 0 && std::none_of(voices_.begin(), voices_.end(), [](const Voice& v) { return v.sounding(); });
+  return tail_blocks_ == 0 && !suction_.sounding() &&
+         std::none_of(voices_.begin(), voices_.end(), [](const Voice& v) { return v.sounding(); });
 }
 
 }  // namespace osteon::audio

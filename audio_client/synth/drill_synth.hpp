@@ -7,6 +7,7 @@
 #include "audio_client/synth/handpiece.hpp"
 #include "audio_client/synth/limiter.hpp"
 #include "audio_client/synth/sound_scene.hpp"
+#include "audio_client/synth/suction_sound.hpp"
 #include "audio_client/synth/voice.hpp"
 
 namespace osteon::audio {
@@ -15,6 +16,7 @@ struct SynthParams {
   double rate_hz = 48000;
   std::uint64_t seed = 1;
   VoiceParams voice;
+  SuctionParams suction;
 };
 
 class DrillSynth {
@@ -41,6 +43,7 @@ class DrillSynth {
   SynthParams params_;
   std::array<Handpiece, kHandpieceKinds> handpieces_;
   std::array<Voice, kVoices> voices_;
+  SuctionSound suction_;  // one for all suckers of the room
   Limiter limiter_;
   Block block_{};
   int used_ = kBlockFrames;  // frames of the block that were already returned

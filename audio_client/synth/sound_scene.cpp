@@ -32,6 +32,7 @@ ToolSound tool_sound(const CuttingState& state) {
   sound.handpiece =
       tool && tool->kind == ToolKind::round_burr ? HandpieceKind::direct_burr : HandpieceKind::geared_drill;
   sound.rpm = within(state.spindle_rpm, kMaxRpm);
+  sound.suction = state.suction;
 
   const bool contact = state.phase == CuttingPhase::cutting || state.phase == CuttingPhase::rubbing;
   if (!contact) return sound;

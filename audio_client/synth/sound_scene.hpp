@@ -18,6 +18,7 @@ struct ToolSound {
   double hardness = 0;     // density under the cutting part / 1.9 g/cm^3, 0 without contact
   double chips = 0;        // chip flow, 0 without cutting; 1 at 1 mm/s through cortical bone; at most 1.5
   bool advancing = false;  // moves into the bone
+  bool suction = false;    // the user's other hand holds the sucker
 };
 
 inline constexpr int kMaxTools = 8;

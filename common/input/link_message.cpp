@@ -58,6 +58,8 @@ bool LinkMessage::yes(const char* name) {
   return field->get<bool>();
 }
 
+bool LinkMessage::yes_if_given(const char* name) { return find(name) != nullptr && yes(name); }
+
 std::string LinkMessage::text(const char* name) {
   const json* field = find(name);
   if (field == nullptr || !field->is_string()) return wrong(name), std::string();

@@ -37,6 +37,7 @@ class LinkMessage {
 
   double number(const char* name, double least, double most);
   bool yes(const char* name);
+  bool yes_if_given(const char* name);  // of a field that older programs do not send; false without it
   std::string text(const char* name);
   Vec3 vector(const char* name, double most);  // each coordinate from -most to most
   Eigen::Quaterniond rotation(const char* name);

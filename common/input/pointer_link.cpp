@@ -30,7 +30,9 @@ std::string encode(const PointerInput& input) {
               {"fine", input.fine},
               {"spindle", input.spindle},
               {"spindle_rpm", input.spindle_rpm},
-              {"tool", shortened(input.tool)}}
+              {"tool", shortened(input.tool)},
+              {"irrigation", input.irrigation},
+              {"suction", input.suction}}
       .dump(-1, ' ', false, json::error_handler_t::replace);
 }
 
@@ -64,6 +66,8 @@ Result<PointerInput> read_pointer_input(std::string_view text) {
   input.spindle = fields->number("spindle", 0.0, 1.0);
   input.spindle_rpm = fields->number("spindle_rpm", 0.0, kMostRpm);
   input.tool = fields->text("tool");
+  input.irrigation = fields->yes_if_given("irrigation");
+  input.suction = fields->yes_if_given("suction");
   if (const Result<void> read = fields->outcome(); !read) return tl::unexpected(read.error());
   return input;
 }

@@ -23,6 +23,8 @@ struct PointerInput {
   double spindle = 0.0;      // share of the spindle's speed, 0 to 1
   double spindle_rpm = 0.0;  // its full speed; 0: the tool's own
   std::string tool{};        // that the hand is to hold; empty: no change
+  bool irrigation = false;   // of the other hand; a message without this field: off
+  bool suction = false;      // likewise
   friend bool operator==(const PointerInput&, const PointerInput&) = default;
 };
 

@@ -22,9 +22,24 @@ void Bluntness::step(const BluntnessParams& params, double torque_nmm, double rp
 
 void FluteClogging::step(const CloggingParams& params, double diameter_mm, double cut_mm, double engaged,
                          double density_g_cm3, double back_mm) noexcept {
-  level_ += engaged * density_g_cm3 / kCorticalDensity * cut_mm / (params.capacity_diameters * diameter_mm);
+  level_ += filling(params, diameter_mm, cut_mm, engaged, density_g_cm3);
   level_ -= back_mm / (params.cleared_diameters * diameter_mm);
   level_ = std::clamp(level_, 0.0, 1.0);
+}
+
+// Solves level' = f - level / rinse_s exactly for the tick's mean f, so that the length of the tick does not matter.
+void FluteClogging::step_rinsed(const CloggingParams& params, double diameter_mm, double cut_mm, double engaged,
+                                double density_g_cm3, double back_mm, double dt_s) noexcept {
+  const double stays = std::exp(-dt_s / params.rinse_s);
+  level_ *= stays;
+  level_ += filling(params, diameter_mm, cut_mm, engaged, density_g_cm3) * (1.0 - stays) * params.rinse_s / dt_s;
+  level_ -= back_mm / (params.cleared_diameters * diameter_mm);
+  level_ = std::clamp(level_, 0.0, 1.0);
+}
+
+double FluteClogging::filling(const CloggingParams& params, double diameter_mm, double cut_mm, double engaged,
+                              double density_g_cm3) noexcept {
+  return engaged * density_g_cm3 / kCorticalDensity * cut_mm / (params.capacity_diameters * diameter_mm);
 }
 
 bool has_flutes(ToolKind kind) noexcept {
@@ -131,7 +146,10 @@ void CuttingEffects::step(const EffectMoment& moment, double dt_s) noexcept {
   const double cut_mm = moment.cutting ? std::max(0.0, moment.advance_mm) : 0.0;
   const double back_mm = std::max(0.0, -moment.advance_mm);
   if (moment.cutting) bluntness_.step(bluntness_params, moment.torque_nmm, moment.spindle_rpm, dt_s);
-  if (flutes_) clogging_.step(clogging_params, diameter_mm_, cut_mm, moment.engaged, moment.density_g_cm3, back_mm);
+  if (flutes_ && moment.irrigation)
+    clogging_.step_rinsed(clogging_params, diameter_mm_, cut_mm, moment.engaged, moment.density_g_cm3, back_mm, dt_s);
+  else if (flutes_)
+    clogging_.step(clogging_params, diameter_mm_, cut_mm, moment.engaged, moment.density_g_cm3, back_mm);
   if (drills_) grab_.step(grab_params, moment.engaged, moment.cutting, moment.cutting_n, back_mm > 0.0);
   if (saws_) binding_.step(binding_params, moment.kerf_pressure_n);
   if (broaches_) {

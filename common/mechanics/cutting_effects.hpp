@@ -34,12 +34,17 @@ class Bluntness {
 // Flutes fill with chips by the bone drilled in one pass, and empty when the drill is drawn back. From `onset` on,
 // chips increase the torque, and the thrust to a smaller degree [A]. Nobody clears a drill for a bicortical hole, or
 // leaves it in for ten diameters of cortical bone.
+//
+// Irrigation keeps drills from clogging (Lee 2018). Nobody gives a rate. Here water takes a fixed share of the chips in
+// each moment: level' = filling - level / rinse_s [A]. So a drill that fills at a steady rate r stays at r · rinse_s.
+// The water reaches all flutes. That flatters deep holes, into which water from outside hardly comes.
 struct CloggingParams {
   double capacity_diameters = 10.0;  // depth in cortical bone until they are full; softer bone gives fewer chips
   double cleared_diameters = 1.5;    // distance of withdrawal until full flutes are empty
   double onset = 0.5;                // level up to which chips leave freely
   double torque_gain = 5.0;          // relative increase of torque with full flutes
   double thrust_gain = 0.5;
+  double rinse_s = 4.0;  // after so long, irrigation leaves 1/e of the chips [A]
 };
 class FluteClogging {
  public:
@@ -47,11 +52,17 @@ class FluteClogging {
   // point that cut bone of that density.
   void step(const CloggingParams& params, double diameter_mm, double cut_mm, double engaged, double density_g_cm3,
             double back_mm) noexcept;
+  // The same under irrigation.
+  void step_rinsed(const CloggingParams& params, double diameter_mm, double cut_mm, double engaged,
+                   double density_g_cm3, double back_mm, double dt_s) noexcept;
   [[nodiscard]] double level() const noexcept { return level_; }  // 0 empty, 1 full
   [[nodiscard]] double torque_factor(const CloggingParams& p) const noexcept { return 1.0 + p.torque_gain * packed(p); }
   [[nodiscard]] double thrust_factor(const CloggingParams& p) const noexcept { return 1.0 + p.thrust_gain * packed(p); }
 
  private:
+  // Share of the flutes that a cut fills.
+  [[nodiscard]] static double filling(const CloggingParams& params, double diameter_mm, double cut_mm, double engaged,
+                                      double density_g_cm3) noexcept;
   [[nodiscard]] double packed(const CloggingParams& p) const noexcept {
     return level_ > p.onset ? (level_ - p.onset) / (1.0 - p.onset) : 0.0;
   }
@@ -140,6 +151,7 @@ struct EffectMoment {
   double advance_mm = 0;  // along the feed, negative when drawn back
   double push_n = 0;      // of the user's hand along the feed
   double kerf_pressure_n = 0;
+  bool irrigation = false;  // the other hand rinses the tool
 };
 
 // All effects for one tool. Order in a tick: felt() and torque_nmm() for the proxy, then step().
@@ -158,7 +170,7 @@ class CuttingEffects {
   // The pull of the grab at breakthrough, on the tool along the feed. Not bounded by what the user feels.
   [[nodiscard]] double pull_n() const noexcept { return drills_ ? grab_.pull_n(grab_params) : 0.0; }
 
-  [[nodiscard]] const FluteClogging& clogging() const noexcept { return clogging_; }
+  [[nodiscard]] const FluteClogging& clogging() const noexcept { return clogging_; }  // empty without flutes
   [[nodiscard]] const BreakthroughGrab& grab() const noexcept { return grab_; }
   [[nodiscard]] const SawBinding& binding() const noexcept { return binding_; }
   [[nodiscard]] const BroachDrive& drive() const noexcept { return drive_; }

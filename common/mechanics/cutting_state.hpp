@@ -28,6 +28,8 @@ struct CuttingState {
   double force_hand_N = 0;    // of the device on the user's hand; 0: also where the device shows no force
   double device_holds_N = 0;  // the most that the device holds for long; 0: it shows no force, or nothing is known
   bool on_metal = false;      // the spindle turns, but metal is in the way: the tool cuts nothing
+  bool irrigation = false, suction = false;  // by the user's other hand
+  double flutes_full = 0;                    // share of the tool's flutes that chips fill, 0 to 1
 };
 
 }  // namespace osteon

@@ -21,7 +21,8 @@ bool at_the_bone(const KnownToolState& state) {
 bool has_news(const KnownToolState& said, const KnownToolState& now, const PoseDeadband& band) {
   return has_moved(said.state.pose_bone_tool, now.state.pose_bone_tool, band) ||
          has_moved(said.state.pose_bone_device, now.state.pose_bone_device, band) || said.buttons != now.buttons ||
-         said.state.phase != now.state.phase || said.state.on_metal != now.state.on_metal;
+         said.state.phase != now.state.phase || said.state.on_metal != now.state.on_metal ||
+         said.state.irrigation != now.state.irrigation || said.state.suction != now.state.suction;
 }
 
 }  // namespace

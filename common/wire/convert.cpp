@@ -119,6 +119,9 @@ v1::CuttingState to_wire(const CuttingState& state) {
   out.set_on_metal(state.on_metal);
   out.set_force_hand_n(state.force_hand_N);
   out.set_device_holds_n(state.device_holds_N);
+  out.set_irrigation(state.irrigation);
+  out.set_suction(state.suction);
+  out.set_flutes_full(state.flutes_full);
   return out;
 }
 
@@ -204,8 +207,8 @@ Result<CuttingState> from_wire(const v1::CuttingState& state) {
   out.tool_name = state.tool_name();
   out.force_physical_N = from_wire(state.force_physical_n());
   if (!all_of_a_tool({state.spindle_rpm(), state.feed_mm_per_s(), state.density_g_cm3(), state.engaged_fraction(),
-                      state.torque_n_mm(), state.depth_mm(), out.force_physical_N.norm(), state.force_hand_n(),
-                      state.device_holds_n()}))
+                      state.torque_n_mm(), state.depth_mm(), state.flutes_full(), out.force_physical_N.norm(),
+                      state.force_hand_n(), state.device_holds_n()}))
     return bad_field("cutting state", "has a number that is not finite or too large for a tool");
   out.spindle_rpm = state.spindle_rpm();
   out.feed_mm_per_s = state.feed_mm_per_s();
@@ -219,6 +222,9 @@ Result<CuttingState> from_wire(const v1::CuttingState& state) {
   out.on_metal = state.on_metal();
   out.force_hand_N = state.force_hand_n();
   out.device_holds_N = state.device_holds_n();
+  out.irrigation = state.irrigation();
+  out.suction = state.suction();
+  out.flutes_full = state.flutes_full();
   return out;
 }
 

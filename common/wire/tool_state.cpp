@@ -56,6 +56,8 @@ v1::ToolState to_tool_state(const CuttingState& state, std::uint32_t buttons, bo
   out.set_spindle_rpm(steps<std::uint32_t>(state.spindle_rpm, 1.0));
   out.set_phase(static_cast<v1::CuttingPhase>(state.phase));
   out.set_on_metal(state.on_metal);
+  out.set_irrigation(state.irrigation);
+  out.set_suction(state.suction);
   if (!with_effort) return out;
   v1::ToolEffort& effort = *out.mutable_effort();
   effort.set_tool_name(state.tool_name.substr(0, kMostNameBytes));
@@ -67,6 +69,7 @@ v1::ToolState to_tool_state(const CuttingState& state, std::uint32_t buttons, bo
   effort.set_depth(steps<std::int32_t>(state.depth_mm, 1024.0));
   effort.set_force_hand(steps<std::uint32_t>(state.force_hand_N, 1000.0));
   effort.set_device_holds(steps<std::uint32_t>(state.device_holds_N, 1000.0));
+  effort.set_flutes_full(steps<std::uint32_t>(std::clamp(state.flutes_full, 0.0, 1.0), 1000.0));
   return out;
 }
 
@@ -88,11 +91,14 @@ Result<bool> take_over(const v1::ToolState& sent, KnownToolState& known) {
     return bad_field("phase", "is not one that this program knows");
   next.phase = static_cast<CuttingPhase>(sent.phase());
   next.on_metal = sent.on_metal();
+  next.irrigation = sent.irrigation();
+  next.suction = sent.suction();
   if (sent.has_effort()) {
     const v1::ToolEffort& effort = sent.effort();
     if (effort.force_size() != 3)
       return bad_field("effort.force", "needs 3 numbers, this has " + std::to_string(effort.force_size()));
     if (effort.engaged() > 1000) return bad_field("effort.engaged", "must be at most 1000");
+    if (effort.flutes_full() > 1000) return bad_field("effort.flutes_full", "must be at most 1000");
     if (effort.tool_name().size() > kMostNameBytes) return bad_field("effort.tool_name", "is longer than 64 bytes");
     next.tool_name = effort.tool_name();
     for (int i = 0; i < 3; ++i) next.force_physical_N[i] = effort.force(i) / 1000.0;
@@ -103,6 +109,7 @@ Result<bool> take_over(const v1::ToolState& sent, KnownToolState& known) {
     next.depth_mm = effort.depth() / 1024.0;
     next.force_hand_N = effort.force_hand() / 1000.0;
     next.device_holds_N = effort.device_holds() / 1000.0;
+    next.flutes_full = effort.flutes_full() / 1000.0;
   }
   known = {next, sent.buttons()};
   return true;

@@ -54,6 +54,12 @@ std::string text(const json& object, const char* field, const char* otherwise) {
   return object.at(field).get<std::string>();
 }
 
+bool yes(const json& object, const char* field) {
+  if (!object.contains(field)) return false;
+  if (!object.at(field).is_boolean()) throw Wrong(std::string("\"") + field + "\" must be true or false");
+  return object.at(field).get<bool>();
+}
+
 void only(const json& object, const std::set<std::string>& known) {
   for (const auto& [key, value] : object.items())
     if (!known.contains(key)) {
@@ -141,7 +147,9 @@ PlanStep read_step(const json& object) {
                 "leave",
                 "hand_stiffness_n_per_mm",
                 "hand_damping_n_s_per_mm",
-                "hand_across_n_per_mm"});
+                "hand_across_n_per_mm",
+                "irrigation",
+                "suction"});
   step.action = drill ? Action::drill : Action::burr;
   step.tool = text(object, "tool", drill ? "drill-3.2" : "burr-round-5");
   const std::string hand = text(object, "hand", "expert");
@@ -173,6 +181,8 @@ PlanStep read_step(const json& object) {
     step.window_v_mm = window[1];
   }
   step.tremor_mm = number(object, "tremor_mm", 0.0, 0.0, 5.0);
+  step.irrigation = yes(object, "irrigation");
+  step.suction = yes(object, "suction");
   if (object.contains("guide")) {
     if (!object.at("guide").is_boolean() || !drill)
       throw Wrong("\"guide\" must be true or false, and belongs to a drill");

@@ -73,7 +73,9 @@ void PointerFeed::command(const PointerInput& input) {
              .push_n = input.push_n,
              .spindle = input.spindle,
              .spindle_rpm = input.spindle_rpm,
-             .tool = tool_};
+             .tool = tool_,
+             .irrigation = input.irrigation,
+             .suction = input.suction};
   exchange_.commands.publish();
 }
 

@@ -356,6 +356,8 @@ void RecordFile::Impl::make_columns() {
   add(column<float, R>("data/guide_play", "mm", "",
                        "while in a guide: permitted distance of the tip from the opening's middle",
                        [](const R& r) { return r.report.contact.guide_play_mm; }));
+  add(column<float, R>("data/flutes_full", "1", "", "share of the tool's flutes that chips fill",
+                       [](const R& r) { return r.report.cutting.flutes_full; }));
   add(enumeration<R>("data/state", "what the tool does to the bone",
                      {{{"idle", 1}, {"free", 2}, {"cutting", 3}, {"rubbing", 4}}},
                      [](const R& r) { return static_cast<int>(r.report.cutting.phase); }));
@@ -378,7 +380,7 @@ void RecordFile::Impl::make_columns() {
   add(column<std::uint32_t, R>("data/events", "1", "",
                                "bits: events of the loop in the tick, named in metadata/event_bits",
                                [](const R& r) { return r.report.events; }));
-  add(column<std::uint32_t, R>(recording::kButtons, "1", "", "bits: 1 clutch, 2 spindle",
+  add(column<std::uint32_t, R>(recording::kButtons, "1", "", "bits: 1 clutch, 2 spindle, 4 irrigation, 8 suction",
                                [](const R& r) { return r.reading.buttons; }));
   add(column<double, R>(recording::kPedal, "1", "", "of a proportional pedal, 0 to 1",
                         [](const R& r) { return r.reading.pedal; }));

@@ -137,6 +137,9 @@ CuttingState TelemetryWorker::state_of(const TickRow& row) const {
   state.on_metal = (r.events & kOnMetal) != 0;
   state.device_holds_N = device_holds_n_;
   state.force_hand_N = device_holds_n_ > 0.0 ? row.force_rendered_n : 0.0;
+  state.flutes_full = r.cutting.flutes_full;
+  state.irrigation = (row.reading.buttons & kIrrigation) != 0;
+  state.suction = (row.reading.buttons & kSuction) != 0;
   return state;
 }
 

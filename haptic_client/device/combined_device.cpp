@@ -73,7 +73,7 @@ DeviceReading CombinedDevice::read() noexcept {
   if (pedal_) {
     const DeviceReading foot = pedal_->read();
     if (foot.usable()) {
-      reading.buttons |= foot.buttons & kSpindlePedal;
+      reading.buttons |= foot.buttons & (kSpindlePedal | kIrrigation | kSuction);
       reading.pedal = std::max(reading.pedal, foot.pedal);
     }
   }

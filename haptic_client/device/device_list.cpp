@@ -64,7 +64,9 @@ constexpr std::array<Kind, 7> kKinds{{
     {"spacemouse", "SpaceMouse: six degrees of freedom without force, or the rotation for another", "",
      [](const std::string&, const DeviceOptions&) -> Made { return make_space_mouse(); },
      [](const DeviceOptions&) { return look_for_space_mouse(); }},
-    {"pedal", "foot pedal, a switch for the spindle; pedal:left, :middle or :right for one of three",
+    {"pedal",
+     "foot pedal, a switch for the spindle; pedal:left, :middle or :right for one of three, "
+     "pedal:left:irrigation-right:suction-middle for the other hand too",
      "left, middle or right",
      [](const std::string& argument, const DeviceOptions&) { return make_pedal(read_pedal_switch(argument)); },
      [](const DeviceOptions&) { return look_for_foot_pedals(false); }},

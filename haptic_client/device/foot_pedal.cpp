@@ -130,6 +130,7 @@ class FootPedal final : public HapticDevice {
     } else {
       if (const std::optional<std::uint8_t> down = take_pedal_report(report)) down_ = *down;
       if (down_ & options_.switches) reading.buttons = kSpindlePedal;
+      reading.buttons |= other_hand((down_ & options_.irrigation) != 0, (down_ & options_.suction) != 0);
     }
     exchange_.publish(reading);
   }
@@ -167,15 +168,33 @@ void PedalAxis::take(double share) noexcept {
 
 Result<FootPedalOptions> read_pedal_switch(std::string_view argument) {
   constexpr std::array<std::string_view, 3> kSides{"left", "middle", "right"};
+  constexpr std::string_view kIrrigates = "irrigation-", kSucks = "suction-";
   FootPedalOptions options;
   if (argument.empty()) return options;
-  const auto side = std::ranges::find(kSides, argument);
-  if (side == kSides.end())
-    return failure(ErrorCode::invalid_input,
-                   "--device pedal:" + std::string(argument) +
-                       ": the pedal must be left, middle or right; without a colon all three turn the "
-                       "spindle");
-  options.switches = static_cast<std::uint8_t>(1 << (side - kSides.begin()));
+  std::uint8_t spindle = 0, taken = 0;
+  std::string_view left = argument;
+  while (true) {
+    const std::size_t colon = left.find(':');
+    std::string_view word = left.substr(0, colon);
+    std::uint8_t& use = word.starts_with(kIrrigates) ? options.irrigation
+                        : word.starts_with(kSucks)   ? options.suction
+                                                     : spindle;
+    if (&use == &options.irrigation) word.remove_prefix(kIrrigates.size());
+    if (&use == &options.suction) word.remove_prefix(kSucks.size());
+    const auto side = std::ranges::find(kSides, word);
+    const auto bit = static_cast<std::uint8_t>(1 << (side - kSides.begin()));
+    if (side == kSides.end() || use != 0 || (taken & bit))
+      return failure(ErrorCode::invalid_input,
+                     "--device pedal:" + std::string(argument) +
+                         ": the pedal must be left, middle or right; without a colon all three turn the spindle. "
+                         "irrigation-right and suction-middle, joined by \":\", are for the other hand, each with a "
+                         "pedal of its own");
+    use = bit;
+    taken = static_cast<std::uint8_t>(taken | bit);
+    if (colon == std::string_view::npos) break;
+    left = left.substr(colon + 1);
+  }
+  options.switches = spindle != 0 ? spindle : static_cast<std::uint8_t>(kSwitches & ~taken);
   return options;
 }
 

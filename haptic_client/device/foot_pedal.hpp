@@ -48,13 +48,16 @@ class PedalAxis {
 struct FootPedalOptions {
   bool proportional = false;
   std::uint8_t switches = 7;  // which pedals of the switch drive the spindle: bits as of take_pedal_report()
+  std::uint8_t irrigation = 0, suction = 0;  // likewise, of what the other hand does
   PedalAxisParams axis = {};
   std::optional<HidUsage> axis_usage = {};  // empty: the first usage that a pedal can have
 };
 
-// The text after "pedal:" on the command line: left, middle or right. The text after "pedal-axis:", joined by colons:
-// inverted, and an axis. The axis is given by its name (accelerator, brake, throttle, slider, x, y, z, rx, ry, rz) or
-// by its usage of the generic desktop page, e.g. 0x32. Error invalid_input: lists the permitted values.
+// The text after "pedal:" on the command line: left, middle or right for the spindle, irrigation-SIDE, suction-SIDE,
+// joined by colons. Pedals that are not named turn the spindle, if none is named for it. The text after "pedal-axis:",
+// joined by colons: inverted, and an axis. The axis is given by its name (accelerator, brake, throttle, slider, x, y,
+// z, rx, ry, rz) or by its usage of the generic desktop page, e.g. 0x32. Error invalid_input: lists the permitted
+// values.
 [[nodiscard]] Result<FootPedalOptions> read_pedal_switch(std::string_view argument);
 [[nodiscard]] Result<FootPedalOptions> read_pedal_axis(std::string_view argument);
 

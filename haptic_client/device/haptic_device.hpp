@@ -32,6 +32,11 @@ struct DeviceLimits {
   Vec3 workspace_middle_mm = Vec3::Zero();
 };
 
+// The bits of what the other hand does.
+[[nodiscard]] constexpr std::uint32_t other_hand(bool irrigation, bool suction) noexcept {
+  return (irrigation ? kIrrigation : 0u) | (suction ? kSuction : 0u);
+}
+
 enum class DeviceStatus : std::uint8_t {
   ok,
   warm,    // motors are warm: only the continuous force may be commanded
@@ -48,6 +53,9 @@ enum class Calibration : std::uint8_t {
 enum DeviceButton : std::uint32_t {
   kClutchButton = 1,  // held: the tool stays and the handle moves freely
   kSpindlePedal = 2,  // held: the spindle turns at full speed
+  // What the other hand does, as long as it is set.
+  kIrrigation = 4,
+  kSuction = 8,
 };
 
 struct DeviceReading {

@@ -226,7 +226,8 @@ LoopReport HapticLoop::tick(const LoopInput& input, const Patch& patch, std::spa
   report.coupling.force_n = coupling.spring_n;
   report.coupling.offset_mm = coupling_.offset_mm();
   torque_nmm_ = load_nmm(step, moment.touching ? coupling.spring_n.norm() : 0.0);
-  wear_and_clog(model, step, moment.touching ? coupling.spring_n : Vec3(Vec3::Zero()));
+  wear_and_clog(model, step, moment.touching ? coupling.spring_n : Vec3(Vec3::Zero()), input.irrigation);
+  report.cutting.flutes_full = effects_[static_cast<std::size_t>(tool_)].clogging().level();
   if (moment.touching) report.coupling.torque_nmm = step.contact_torque_nmm;
 
   // The spring of the rotation belongs to the coupling. The moment of the cut does not: the bone turns a spindle back
@@ -241,7 +242,8 @@ LoopReport HapticLoop::tick(const LoopInput& input, const Patch& patch, std::spa
   return report;
 }
 
-void HapticLoop::wear_and_clog(const ToolModel& model, const ProxyStep& step, const Vec3& spring_n) noexcept {
+void HapticLoop::wear_and_clog(const ToolModel& model, const ProxyStep& step, const Vec3& spring_n,
+                               bool irrigation) noexcept {
   const Vec3 axis = proxy_.pose().direction(Vec3::UnitZ());
   EffectMoment moment;
   moment.spindle_rpm = spindle_.rpm;
@@ -253,6 +255,7 @@ void HapticLoop::wear_and_clog(const ToolModel& model, const ProxyStep& step, co
   moment.torque_nmm = step.torque_nmm;
   moment.advance_mm = model.axial ? step.moved_mm.dot(axis) : step.feed_mm_per_s * params_.dt_s;
   moment.push_n = -spring_n.dot(axis);
+  moment.irrigation = irrigation;
   // A hand that presses a blade to one side presses its plate on the kerf. The plate's normal is y.
   if (step.engaged > 0.0) moment.kerf_pressure_n = std::abs(spring_n.dot(proxy_.pose().direction(Vec3::UnitY())));
   effects_[static_cast<std::size_t>(tool_)].step(moment, params_.dt_s);

@@ -68,8 +68,9 @@ struct LoopInput {
   bool device_ok = true;     // connected, working and calibrated; false: no force
   bool device_warm = false;  // show no more than the continuous force
   RoomLink room = RoomLink::follows;
-  int periods = 1;      // since the last tick; 1 when on time
-  bool may_cut = true;  // false: the tool only blocks, even while its spindle turns
+  int periods = 1;          // since the last tick; 1 when on time
+  bool irrigation = false;  // the other hand rinses the tool
+  bool may_cut = true;      // false: the tool only blocks, even while its spindle turns
 };
 
 // Bits of LoopReport::events.
@@ -119,6 +120,7 @@ struct LoopReport {
     double work_mj = 0;           // of that force over the path cut in this tick
     double pushed_back_mj = 0;    // work of a cut's force that rotation undid in the same tick; not shown
     double feed_mm_per_s = 0, density_g_cm3 = 0, engaged = 0, torque_nmm = 0;
+    double flutes_full = 0;     // share of the flutes that chips fill, after the tick
     double across_n = 0;        // across the feed; the hand feels it through the motor port
     unsigned out_of_range = 0;  // bits of OutOfRange: where the law is used outside its range
   } cutting;
@@ -209,7 +211,7 @@ class HapticLoop {
     return mapping_.to_device(moved_ ? bone_.direction(bone) : bone);
   }
   void record(const ToolModel& model, const ProxyStep& step, LoopReport& report) noexcept;
-  void wear_and_clog(const ToolModel& model, const ProxyStep& step, const Vec3& spring_n) noexcept;
+  void wear_and_clog(const ToolModel& model, const ProxyStep& step, const Vec3& spring_n, bool irrigation) noexcept;
   [[nodiscard]] double load_nmm(const ProxyStep& step, double pressed_n) noexcept;
   // Force and torque on the handle: the coupling's within ramp, slew limit and energy, and the motor's. `cut_nmm`:
   // moment of the cut, physical.

@@ -150,6 +150,7 @@ SessionTick FreeHandSession::tick(const Patch& patch, RoomLink room, int periods
   input.pose_device_tool = reading.pose_device_tool;
   input.clutch = !usable || (reading.buttons & kClutchButton) != 0;
   input.spindle_rpm = usable && taken_up_ ? reading.spindle() * plan_.steps[0].spindle_rpm : 0.0;
+  input.irrigation = usable && (reading.buttons & kIrrigation) != 0;
   input.device_ok = usable;
   input.device_warm = reading.status == DeviceStatus::warm;
   input.room = room;

@@ -250,6 +250,7 @@ SessionTick PointerSession::tick(const Patch& patch, RoomLink room, int periods,
   const double own_rpm = plan_.tools[static_cast<std::size_t>(held_)].tool.spindle_rpm;
   const double full_rpm = command_.tool == held_ && command_.spindle_rpm > 0.0 ? command_.spindle_rpm : own_rpm;
   const double rpm = works && !silent() ? command_.spindle * full_rpm : 0.0;
+  const std::uint32_t other = silent() ? 0u : other_hand(command_.irrigation, command_.suction);
   if (taken_up_) {
     const WorkspaceMapping& mapping = loop_.mapping();
     HandCommand command = hand_;
@@ -258,7 +259,7 @@ SessionTick PointerSession::tick(const Patch& patch, RoomLink room, int periods,
     // A hand that is stiffer across the axis than along it leaves the straight way, so a tilted tool would dip.
     const HandParams& hand = device_.hand().params();
     device_.hold_across(phase_ < PointerPhase::pushes ? hand.stiffness_n_per_mm : across_n_per_mm_);
-    device_.command(command, rotation_, rpm > 0.0 ? kSpindlePedal : 0u);
+    device_.command(command, rotation_, (rpm > 0.0 ? kSpindlePedal : 0u) | other);
     device_.step(dt_s);
   }
   const DeviceReading reading = device_.read();
@@ -266,6 +267,7 @@ SessionTick PointerSession::tick(const Patch& patch, RoomLink room, int periods,
   input.pose_device_tool = reading.pose_device_tool;
   input.clutch = !taken_up_;
   input.spindle_rpm = rpm;
+  input.irrigation = (reading.buttons & kIrrigation) != 0;
   input.device_ok = taken_up_;
   input.room = room;
   input.periods = periods;

@@ -21,6 +21,7 @@ struct PointerCommand {
   bool on_bone = false, push = false, fine = false;
   double push_n = 10.0, spindle = 0.0, spindle_rpm = 0.0;
   int tool = 0;  // index in the plan's tools
+  bool irrigation = false, suction = false;
 };
 
 // What the hand and the tool do; bone frame.

@@ -50,7 +50,7 @@ SessionTick SimulatedSession::tick(const Patch& patch, RoomLink room, int period
     command.target_mm = mapping.pose_device_tool({command.target_mm, result.order.rotation}).position_mm;
     command.axis = mapping.to_device(command.axis);
     device_.command(command, mapping.pose_device_tool({Vec3::Zero(), result.order.rotation}).rotation,
-                    result.order.spindle_rpm > 0.0 ? kSpindlePedal : 0u);
+                    (result.order.spindle_rpm > 0.0 ? kSpindlePedal : 0u) | result.order.other_hand);
     device_.step(dt_s);
   }
 
@@ -59,6 +59,7 @@ SessionTick SimulatedSession::tick(const Patch& patch, RoomLink room, int period
   input.pose_device_tool = reading.pose_device_tool;
   input.clutch = (reading.buttons & kClutchButton) != 0;
   input.spindle_rpm = reading.buttons & kSpindlePedal ? result.order.spindle_rpm : 0.0;
+  input.irrigation = (reading.buttons & kIrrigation) != 0;
   input.device_ok = reading.usable();
   input.device_warm = reading.status == DeviceStatus::warm;
   input.room = room;

@@ -5,6 +5,8 @@
 #include <numbers>
 #include <span>
 
+#include "haptic_client/device/haptic_device.hpp"
+
 namespace osteon::haptic {
 namespace {
 
@@ -267,8 +269,10 @@ Digest plan_digest(const ReadyPlan& plan) {
                                p.feed_mm_per_s, p.beyond_mm, p.to_mm, p.window_u_mm, p.window_v_mm, p.depth_mm,
                                p.sweep_mm_per_s, p.wear, p.tremor_mm, p.seconds})
       hasher.number(value);
-    // Plans without this value keep their digest.
+    // Plans without these values keep their digest.
     if (p.hand_across_n_per_mm > 0.0) hasher.text("across"), hasher.number(p.hand_across_n_per_mm);
+    if (p.irrigation) hasher.text("irrigation");
+    if (p.suction) hasher.text("suction");
     for (const Vec3& v : {step.site.entry_mm, step.site.axis})
       for (const double value : v) hasher.number(value);
   }
@@ -600,6 +604,7 @@ SurgeonOrder Surgeon::act(const LoopReport& report, double dt_s) noexcept {
   order.rotation = step.rotation;
   if (step.plan.tremor_mm > 0.0 && step.takes_tool()) tremble(step, order);
   order.spindle_rpm = spindle_rpm_;
+  order.other_hand = other_hand(step.plan.irrigation, step.plan.suction);
   if (finished) {
     results_[step_].completed = !results_[step_].gave_up;
     ++step_;

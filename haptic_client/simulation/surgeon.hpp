@@ -43,7 +43,8 @@ struct PlanStep {
   bool leave = false;          // drill: the pin stays in place at the end; a screw always does
   double tremor_mm = 0;        // of the hand: its largest deviation, across the axis
   PlanEntry entry;
-  double seconds = 0;  // wait, place
+  double seconds = 0;                        // wait, place
+  bool irrigation = false, suction = false;  // drill, burr: by the other hand, until the next tool
 };
 
 // A step whose site on the bone was found and whose path was computed.
@@ -106,6 +107,7 @@ struct SurgeonOrder {
   std::size_t step = 0;
   HandCommand hand;
   double spindle_rpm = 0;
+  std::uint32_t other_hand = 0;                                  // bits as of other_hand()
   Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();  // of the handle, as the hand holds it
   bool take_up = false;                                          // the tool is taken up at hand.target_mm
 };

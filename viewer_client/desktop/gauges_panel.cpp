@@ -92,6 +92,7 @@ GaugesPanel::GaugesPanel(QWidget* parent) : QWidget(parent) {
   spindle_ = gauge(tr("Spindle"), "spindle");
   feed_ = gauge(tr("Feed"), "feed");
   density_ = gauge(tr("Density"), "density");
+  flutes_ = gauge(tr("Flutes filled"), "flutes");
   budget_ = new QProgressBar;
   budget_->setObjectName("budget");
   budget_->setTextVisible(false);
@@ -161,6 +162,7 @@ void GaugesPanel::show(const CuttingState& state, const std::optional<PointerOut
   feed_->setText(tr("%1 mm/s").arg(number(state.feed_mm_per_s, 1)));
   const bool in_bone = state.engaged_fraction > 0.0;
   density_->setText(in_bone ? tr("%1 g/cm³").arg(number(state.density_g_cm3, 2)) : QString("–"));
+  flutes_->setText(state.flutes_full > 0.0 ? tr("%1 %").arg(number(100.0 * state.flutes_full, 0)) : QString("–"));
   show_budget(hand);
   plot_->add(at_s, bone_n, hand_n);
 }

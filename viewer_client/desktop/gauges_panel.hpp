@@ -59,7 +59,7 @@ class GaugesPanel : public QWidget {
 
  private:
   void show_budget(const std::optional<HandForce>& hand);
-  QLabel *bone_, *hand_, *torque_, *depth_, *spindle_, *feed_, *density_, *push_;
+  QLabel *bone_, *hand_, *torque_, *depth_, *spindle_, *feed_, *density_, *flutes_, *push_;
   QProgressBar* budget_;  // the force on the hand, of what the device holds for long
   QLabel *budget_words_, *saturated_;
   ScrollingPlot* plot_;

@@ -57,7 +57,7 @@ constexpr double kMostRiskLimit_mm = 50.0;
 constexpr const char* kFirstTool = "drill-3.2";
 
 // What changes the room, beside the tools.
-constexpr const char* kWorkActions[] = {"undo", "redo", "mark", "put_down", "spindle"};
+constexpr const char* kWorkActions[] = {"undo", "redo", "mark", "put_down", "spindle", "irrigation", "suction"};
 
 // The first file or folder that somebody drags over the window. Empty: none on this computer.
 std::filesystem::path dragged_path(const QMimeData& data) {
@@ -160,11 +160,13 @@ void MainWindow::make_status() {
   risk_->setObjectName("risk");
   device_ = new QLabel;
   device_->setObjectName("device");
+  other_hand_ = new QLabel;
+  other_hand_->setObjectName("other_hand");
   position_ = new QLabel;
   position_->setObjectName("position");
   connection_ = new QLabel;
   connection_->setObjectName("connection");
-  for (QLabel* label : std::initializer_list<QLabel*>{risk_, device_, position_, connection_})
+  for (QLabel* label : std::initializer_list<QLabel*>{risk_, other_hand_, device_, position_, connection_})
     statusBar()->addPermanentWidget(label);
   risk_->hide();  // the bar has shown it
 }
@@ -173,7 +175,8 @@ void MainWindow::enable_room_actions(bool on) {
   for (QAction* action : room_actions_) action->setEnabled(on);
   tools_->setEnabled(on && !watching_);
   for (QDockWidget* panel : findChildren<QDockWidget*>())
-    panel->setEnabled(on || panel->objectName() == "connection_panel");  // it says why there is no room
+    panel->setEnabled(on || panel->objectName() == "connection_panel");                // it says why there is no room
+  for (QAction* action : {irrigation_, suction_}) action->setEnabled(on && pointer_);  // its hand has another one
   if (watching_)
     for (const char* name : kWorkActions) findChild<QAction*>(name)->setEnabled(false);
 }
@@ -185,7 +188,8 @@ void MainWindow::say(const QString& sentence) {
   constexpr int kMargin_px = 60;  // they grow with what they say
   if (!position_->text().isEmpty()) {
     room = width;
-    for (const QLabel* label : std::initializer_list<const QLabel*>{risk_, device_, position_, connection_})
+    for (const QLabel* label :
+         std::initializer_list<const QLabel*>{risk_, other_hand_, device_, position_, connection_})
       if (label->isVisible() && !label->text().isEmpty()) room = std::min(room, label->x());
   }
   const QString shown =
@@ -436,6 +440,7 @@ void MainWindow::leave_room() {
   pointer_timer_.stop();
   cap_timer_.stop();
   put_tool_down();
+  rest_other_hand();
   undo_points_.clear();
   view_->show_room(nullptr, {});
   risk_->set_plan(nullptr);
@@ -449,7 +454,7 @@ void MainWindow::leave_room() {
   address_.clear();
   room_name_.clear();
   setWindowTitle("Osteon");
-  for (QLabel* label : {device_, position_, connection_}) label->clear();
+  for (QLabel* label : {other_hand_, device_, position_, connection_}) label->clear();
   start_->refresh();
   pages_->setCurrentWidget(start_);
 }
@@ -492,6 +497,12 @@ void MainWindow::put_tool_down() {
   if (spindle_) spindle_->setChecked(false);
   tools_->show_held({});
   send_pointer();
+}
+
+void MainWindow::rest_other_hand() {
+  view_->pointer().set_irrigation(false);
+  view_->pointer().set_suction(false);
+  for (QAction* action : {irrigation_, suction_}) action->setChecked(false);
 }
 
 void MainWindow::place_item(const SurfaceHit& hit) {
@@ -566,6 +577,7 @@ void MainWindow::show_help() {
       {tr("Right button, dragged"), tr("turns the tool; with Ctrl about its own axis")},
       {tr("Shift"), tr("motions at a tenth")},
       {tr("Space"), tr("spindle on or off")},
+      {tr("I and U"), tr("irrigation and suction of the other hand, on or off")},
       {tr("Escape"), tr("puts the tool down")},
       {tr("Middle button"), tr("turns the bone; with Shift it moves it")},
       {tr("Ctrl and wheel"), tr("nearer or farther")},
@@ -587,6 +599,7 @@ void MainWindow::refresh_gauges() {
   if (updater != nullptr && !updater->states().empty()) {
     const CuttingState& state = updater->states().front();
     gauges_->show(state, hand, 1e-3 * static_cast<double>(clock_.elapsed()));
+    show_other_hand(state);
     const Vec3& at = state.pose_bone_tool.position_mm;
     position_->setText(tr("Tip %1, %2, %3 mm")
                            .arg(QLocale().toString(at.x(), 'f', 1), QLocale().toString(at.y(), 'f', 1),
@@ -598,6 +611,14 @@ void MainWindow::refresh_gauges() {
   if (const QString fault = QString::fromStdString(view_->take_plan_fault()); !fault.isEmpty()) say(fault);
   if (pointer_) device_->setText(pointer_->connected() ? tr("Pointer") : tr("The pointer's device is away"));
   if (hand && !hand->trouble.empty()) say(QString::fromStdString(hand->trouble));
+}
+
+// Of the tool that the gauges show, as everybody in the room sees it.
+void MainWindow::show_other_hand(const CuttingState& state) {
+  QStringList does;
+  if (state.irrigation) does << tr("Irrigation");
+  if (state.suction) does << tr("Suction");
+  other_hand_->setText(does.join(", "));
 }
 
 ConnectionState MainWindow::connections() {

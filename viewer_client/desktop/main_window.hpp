@@ -35,6 +35,7 @@ class SurgeryToolBar;
 class Tour;
 class ViewOptions;
 struct ConnectionState;
+struct CuttingState;
 
 // A room on a server that others run.
 struct RoomAddress {
@@ -82,6 +83,7 @@ class MainWindow : public QMainWindow {
   void make_edit_menu();
   void make_view_menu();
   void make_tools_menu();
+  void make_other_hand(QMenu* tools);
   void make_help_menu();
   void make_panels();
   void make_status();
@@ -98,6 +100,7 @@ class MainWindow : public QMainWindow {
   void room_ended(const QString& sentence);
   void take_tool(const std::string& tool);
   void put_tool_down();
+  void rest_other_hand();
   void place_item(const SurfaceHit& hit);
   void send_pointer();
   void ask(RoomLink::Request request, const QString& done);
@@ -109,6 +112,7 @@ class MainWindow : public QMainWindow {
   void save_picture();
   void show_help();
   void refresh_gauges();
+  void show_other_hand(const CuttingState& state);
   [[nodiscard]] ConnectionState connections();
   void choose_risk_limit();
   void say(const QString& sentence);
@@ -126,9 +130,9 @@ class MainWindow : public QMainWindow {
   SoundControl* sound_control_ = nullptr;
   Tour* tour_ = nullptr;
   RiskGauge* risk_ = nullptr;
-  QLabel *position_ = nullptr, *device_ = nullptr, *connection_ = nullptr;
+  QLabel *position_ = nullptr, *device_ = nullptr, *connection_ = nullptr, *other_hand_ = nullptr;
   std::vector<QAction*> room_actions_;
-  QAction *sound_ = nullptr, *spindle_ = nullptr;
+  QAction *sound_ = nullptr, *spindle_ = nullptr, *irrigation_ = nullptr, *suction_ = nullptr;
 
   std::unique_ptr<CaseMaker> maker_;
   std::unique_ptr<ImporterRun> saver_;

@@ -13,6 +13,7 @@
 #include "viewer_client/desktop/main_window.hpp"
 #include "viewer_client/desktop/menu_keys.hpp"
 #include "viewer_client/desktop/practice_room.hpp"
+#include "viewer_client/desktop/properties_panel.hpp"
 #include "viewer_client/desktop/sound_control.hpp"
 #include "viewer_client/desktop/tool_bar.hpp"
 #include "viewer_client/desktop/tour.hpp"
@@ -123,6 +124,7 @@ void MainWindow::make_tools_menu() {
       },
       true);
   spindle_->setCheckable(true);
+  make_other_hand(tools);
   sound_ = add_action(
       tools, tr("S&ound"), "sound", QKeySequence("Ctrl+Shift+S"),
       [this] { sound_control_->set_on(sound_->isChecked()); }, false);
@@ -137,6 +139,27 @@ void MainWindow::make_tools_menu() {
   add_action(
       tools, tr("&Volume and wave form…"), "sound_settings", QKeySequence("Ctrl+Shift+V"),
       [this] { sound_control_->show_dialog(); }, false);
+}
+
+void MainWindow::make_other_hand(QMenu* tools) {
+  irrigation_ = add_action(
+      tools, tr("&Irrigation"), "irrigation", Qt::Key_I,
+      [this] {
+        view_->pointer().set_irrigation(irrigation_->isChecked());
+        send_pointer();
+      },
+      true);
+  suction_ = add_action(
+      tools, tr("S&uction"), "suction", Qt::Key_U,
+      [this] {
+        view_->pointer().set_suction(suction_->isChecked());
+        send_pointer();
+      },
+      true);
+  for (QAction* action : {irrigation_, suction_}) {
+    action->setCheckable(true);
+    properties_->add_switch(*action);
+  }
 }
 
 void MainWindow::make_help_menu() {

@@ -1,5 +1,7 @@
 #include "viewer_client/desktop/properties_panel.hpp"
 
+#include <QAction>
+#include <QCheckBox>
 #include <QComboBox>
 #include <QCoreApplication>
 #include <QFormLayout>
@@ -25,11 +27,11 @@ constexpr int kMostRpm = 100000;
 PropertiesPanel::PropertiesPanel(std::function<void(const Chosen&)> changed,
                                  std::function<void(const std::string&)> resized, QWidget* parent)
     : QWidget(parent), changed_(std::move(changed)), resized_(std::move(resized)) {
-  auto* form = new QFormLayout(this);
+  form_ = new QFormLayout(this);
   const auto row = [&](const QString& what, const char* name, QWidget* widget) {
     widget->setObjectName(name);
     widget->setAccessibleName(what);
-    form->addRow(what, widget);
+    form_->addRow(what, widget);
   };
   size_ = new QComboBox;
   size_->setObjectName("size");
@@ -39,7 +41,7 @@ PropertiesPanel::PropertiesPanel(std::function<void(const Chosen&)> changed,
     for (const std::string& tool : group.tools) size_->addItem(tool_title(tool));
   size_->setMinimumWidth(size_->sizeHint().width());
   size_->clear();
-  form->addRow(size_);
+  form_->addRow(size_);
   rpm_ = new QSpinBox;
   rpm_->setRange(0, kMostRpm);
   rpm_->setSingleStep(100);
@@ -86,6 +88,16 @@ void PropertiesPanel::show_push(double push_n) {
   showing_ = true;
   push_->setValue(static_cast<int>(push_n));
   showing_ = false;
+}
+
+void PropertiesPanel::add_switch(QAction& action) {
+  auto* box = new QCheckBox(action.iconText());
+  box->setObjectName(action.objectName() + "_box");
+  box->setChecked(action.isChecked());
+  form_->addRow(box);
+  connect(box, &QCheckBox::clicked, &action, &QAction::trigger);
+  connect(&action, &QAction::toggled, box, &QCheckBox::setChecked);
+  connect(&action, &QAction::changed, box, [box, action = &action] { box->setEnabled(action->isEnabled()); });
 }
 
 PropertiesPanel::Chosen PropertiesPanel::chosen() const {

@@ -6,7 +6,9 @@
 #include <functional>
 #include <string>
 
+class QAction;
 class QComboBox;
+class QFormLayout;
 class QLabel;
 class QSpinBox;
 
@@ -27,12 +29,15 @@ class PropertiesPanel : public QWidget {
   // Shows the tool's own values.
   void show_tool(const std::string& tool);
   void show_push(double push_n);
+  // A check box for an action that can be checked. Either shows the other's state.
+  void add_switch(QAction& action);
   [[nodiscard]] Chosen chosen() const;
 
  private:
   std::function<void(const Chosen&)> changed_;
   std::function<void(const std::string&)> resized_;
   bool showing_ = false;  // its own change of a value is none of the user's
+  QFormLayout* form_;
   QComboBox* size_;
   QSpinBox *rpm_, *push_;
   QLabel *teeth_, *feed_;

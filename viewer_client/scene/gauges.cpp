@@ -40,6 +40,9 @@ std::string gauge_text(const CuttingState& state) {
   text += line("\nforce %.1f N", rounded(state.force_physical_N.norm(), 0.1));
   text += line("\ndepth %.1f mm", rounded(state.depth_mm, 0.1));
   if (state.on_metal) text += "\non metal: it does not cut";
+  if (state.flutes_full >= 0.005) text += line("\nflutes %.0f %% full", rounded(100.0 * state.flutes_full, 1.0));
+  if (state.irrigation) text += "\nirrigation";
+  if (state.suction) text += "\nsuction";
   // Without contact there is no density to show.
   if (state.engaged_fraction > 0.0) text += line("\ndensity %.2f g/cm\xC2\xB3", rounded(state.density_g_cm3, 0.01));
   return text;

@@ -20,6 +20,7 @@ inline constexpr double kLongestTool_mm = 200.0;
 [[nodiscard]] inline bool looks_same(const CuttingState& a, const CuttingState& b) {
   const auto within = [](double x, double y, double half_digit) { return std::abs(x - y) <= half_digit; };
   return a.author == b.author && a.tool_name == b.tool_name && a.phase == b.phase && a.on_metal == b.on_metal &&
+         a.irrigation == b.irrigation && a.suction == b.suction && within(a.flutes_full, b.flutes_full, 0.005) &&
          looks_same(a.pose_bone_tool, b.pose_bone_tool) && looks_same(a.pose_bone_device, b.pose_bone_device) &&
          within(a.spindle_rpm, b.spindle_rpm, 0.5) && within(a.depth_mm, b.depth_mm, 0.05) &&
          (a.force_physical_N - b.force_physical_N).norm() <= 0.05 && within(a.force_hand_N, b.force_hand_N, 0.05) &&

@@ -34,6 +34,8 @@ class ToolPointer {
   void set_push(double newtons);
   void set_fine(bool fine) { input_.fine = fine; }
   void set_spindle(bool on) { spindle_ = on; }
+  void set_irrigation(bool on) { input_.irrigation = on; }
+  void set_suction(bool on) { input_.suction = on; }
 
   [[nodiscard]] bool pushing() const { return input_.push; }
   [[nodiscard]] bool on_bone() const { return input_.on_bone; }

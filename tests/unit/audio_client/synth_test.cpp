@@ -227,6 +227,40 @@ TEST(DrillSound, SilentAtRest) {
   EXPECT_TRUE(synth.silent());
 }
 
+CuttingState with_suction(CuttingState state) {
+  state.suction = true;
+  return state;
+}
+
+// A sucker is heard without a drill that turns, and is a soft hiss without tones beside one that does.
+TEST(SuctionSound, IsHeardAloneAndSoftlyBesideTheDrill) {
+  const std::vector<float> alone = steady(with_suction(idle_drill()));
+  const double hiss_db = sound::band_db(sound::power_spectrum(alone, kRate_hz), 500, 8000);
+  const double drill_db = sound::band_db(sound::power_spectrum(steady(cortical_drill(1345)), kRate_hz), 500, 8000);
+  std::printf("  suction %.1f dB, a drill in cortical bone %.1f dB\n", hiss_db, drill_db);
+  EXPECT_GT(sound::peak(alone), 0.005);
+  EXPECT_LT(hiss_db, drill_db - 6.0);
+  // No line stands out of the band: a tone would hold most of the power in a few bins.
+  const auto share = [&](double from_hz, double to_hz) {
+    return std::pow(10.0, 0.1 * (sound::band_db(sound::power_spectrum(alone, kRate_hz), from_hz, to_hz) - hiss_db));
+  };
+  for (double hz = 500.0; hz < 7900.0; hz += 100.0) EXPECT_LT(share(hz, hz + 100.0), 0.1) << hz;
+}
+
+TEST(SuctionSound, SwellsAndFadesWithoutAClickAndFallsSilent) {
+  DrillSynth synth = make_synth();
+  std::vector<float> all = play(synth, idle_drill(), 0.1);
+  for (const CuttingState& state : {with_suction(idle_drill()), idle_drill()}) {
+    const std::vector<float> part = play(synth, state, 1.5);
+    all.insert(all.end(), part.begin(), part.end());
+  }
+  // A hiss has steps of its own. The ends add none.
+  const double own_step = sound::largest_step(std::span(all).subspan(48000, 24000));
+  EXPECT_LT(sound::largest_step(all), 1.5 * own_step);
+  EXPECT_EQ(sound::peak(std::span(all).last(4800)), 0);
+  EXPECT_TRUE(synth.silent());
+}
+
 TEST(DrillSound, ResetSilencesAtOnceAndStartsAgainAlike) {
   DrillSynth synth = make_synth();
   const std::vector<float> first = play(synth, cortical_drill(1345), 0.5);

@@ -35,6 +35,7 @@ PointerInput an_input() {
   input.spindle = 0.75;
   input.spindle_rpm = 1200.0;
   input.tool = "drill-3.2";
+  input.irrigation = input.suction = true;
   return input;
 }
 
@@ -124,15 +125,16 @@ std::vector<json> no_number(double least, double most) {
           -1e300,  1e300};
 }
 
-// Each value alone, and the field's absence, is refused with a sentence that names the field.
-void expect_each_refused(const std::string& valid, const Wrong& wrong, Refusal refusal) {
+// Each value alone, and the absence of a field that is not `optional`, is refused with a sentence that names the field.
+void expect_each_refused(const std::string& valid, const Wrong& wrong, Refusal refusal,
+                         const std::set<std::string>& optional = {}) {
   ASSERT_TRUE(refusal(valid));
   const json message = json::parse(valid);
   for (const auto& [field, values] : wrong) {
     ASSERT_TRUE(message.contains(field)) << field;
     std::vector<json> broken;
     for (const json& value : values) (broken.emplace_back(message))[field] = value;
-    broken.emplace_back(message).erase(field);
+    if (!optional.contains(field)) broken.emplace_back(message).erase(field);
     for (const json& one : broken) {
       const Result<void> refused = refusal(one.dump());
       ASSERT_FALSE(refused) << one.dump();
@@ -154,8 +156,21 @@ TEST(PointerMessage, EachFieldOfTheWindowIsChecked) {
                        {"push_n", no_number(kLeastPush_n, kMostPush_n)},
                        {"spindle", no_number(0.0, 1.0)},
                        {"spindle_rpm", no_number(0.0, 2e5)},
-                       {"tool", kNoText}},
-                      input_refusal);
+                       {"tool", kNoText},
+                       {"irrigation", kNoBool},
+                       {"suction", kNoBool}},
+                      input_refusal, {"irrigation", "suction"});
+}
+
+TEST(PointerMessage, AnOlderWindowHasNoOtherHand) {
+  json message = json::parse(encode(an_input()));
+  message.erase("irrigation");
+  message.erase("suction");
+  const auto read = read_pointer_input(message.dump());
+  ASSERT_TRUE(read) << read.error().message;
+  PointerInput expected = an_input();
+  expected.irrigation = expected.suction = false;
+  EXPECT_EQ(*read, expected);
 }
 
 TEST(PointerMessage, EachFieldOfTheHapticClientIsChecked) {

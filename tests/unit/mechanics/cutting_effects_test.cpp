@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <random>
 #include <vector>
 
 #include "common/mechanics/force_law.hpp"
@@ -84,6 +85,61 @@ TEST(FluteClogging, ABicorticalHoleIsNoDepth) {
     for (int i = 0; i < 100; ++i) flutes.step({}, 3.2, 0.01 * layer.thickness, 1.0, layer.density, 0.0);
   EXPECT_EQ(flutes.torque_factor({}), 1.0);
   EXPECT_EQ(flutes.thrust_factor({}), 1.0);
+}
+
+// Water takes a fixed share of the chips in each moment, so that L(t) = L0 exp(-t / tau), whatever the ticks.
+TEST(Irrigation, WashesTheFlutesByAnExponential) {
+  CloggingParams params;
+  params.rinse_s = 3.0;
+  for (const double dt : {5e-4, 1e-3, 1e-2, 0.5}) {
+    FluteClogging flutes;
+    flutes.step(params, 3.2, 26.0, 1.0, 1.9, 0.0);
+    ASSERT_NEAR(flutes.level(), 26.0 / 32.0, 1e-12);
+    double t_s = 0.0;
+    while (t_s < 9.0 - 1e-9) {
+      flutes.step_rinsed(params, 3.2, 0.0, 0.0, 0.0, 0.0, dt);
+      t_s += dt;
+      ASSERT_NEAR(flutes.level(), 26.0 / 32.0 * std::exp(-t_s / 3.0), 1e-9) << dt;
+    }
+  }
+}
+
+// A drill that fills by r each second has r tau (1 - exp(-t / tau)) in its flutes, and r tau in the end. At 1 mm/s in
+// cortical bone r is 1/32, so that it never clogs. Dry it is full after 32 s.
+TEST(Irrigation, KeepsADrillThatGoesOnSteadilyFromClogging) {
+  CloggingParams params;
+  params.rinse_s = 3.0;
+  for (const double dt : {1e-3, 1e-2, 0.25}) {
+    FluteClogging rinsed, dry;
+    double t_s = 0.0;
+    while (t_s < 40.0 - 1e-9) {
+      rinsed.step_rinsed(params, 3.2, 1.0 * dt, 1.0, 1.9, 0.0, dt);
+      dry.step(params, 3.2, 1.0 * dt, 1.0, 1.9, 0.0);
+      t_s += dt;
+      ASSERT_NEAR(rinsed.level(), 3.0 / 32.0 * (1.0 - std::exp(-t_s / 3.0)), 1e-9) << dt;
+      ASSERT_EQ(rinsed.torque_factor(params), 1.0);
+    }
+    EXPECT_EQ(dry.torque_factor(params), 6.0);
+  }
+}
+
+// Whatever a hand does, the flutes hold no less than nothing, no more than they can, and no more than dry.
+TEST(Irrigation, NeverHoldsMoreChipsThanDryFlutesOrLessThanNone) {
+  std::minstd_rand random(5);
+  std::uniform_real_distribution<double> share(0.0, 1.0);
+  for (int trial = 0; trial < 50; ++trial) {
+    FluteClogging rinsed, dry;
+    for (int i = 0; i < 400; ++i) {
+      const bool back = share(random) < 0.3;
+      const double way_mm = std::pow(10.0, 4.0 * share(random) - 2.0), engaged = share(random);
+      const double cut_mm = back ? 0.0 : way_mm, back_mm = back ? way_mm : 0.0;
+      rinsed.step_rinsed({}, 3.2, cut_mm, engaged, 1.9, back_mm, std::pow(10.0, 3.0 * share(random) - 4.0));
+      dry.step({}, 3.2, cut_mm, engaged, 1.9, back_mm);
+      ASSERT_GE(rinsed.level(), 0.0);
+      ASSERT_LE(rinsed.level(), dry.level());
+      ASSERT_LE(dry.level(), 1.0);
+    }
+  }
 }
 
 // The share of the point in bone while the point comes out: from 1 to 0.
@@ -356,6 +412,37 @@ TEST(CuttingEffects, ADeepHoleClogsADrillButNoBurr) {
   // Withdrawal clears the flutes.
   for (int i = 0; i < 100; ++i) drilling.step({.spindle_rpm = 1000, .advance_mm = -0.1}, kDt);
   EXPECT_EQ(drilling.torque_nmm(10.0), 10.0);
+}
+
+// A clogged drill is rinsed where it stands. After tau ln 2 its flutes are half full, and chips leave freely again.
+TEST(CuttingEffects, IrrigationFreesACloggedDrillAndDoesNothingToABurr) {
+  const Tool drill = *find_tool("drill-3.2"), burr = *find_tool("burr-round-5");
+  CuttingEffects drilling(drill), burring(burr);
+  drilling.clogging_params.rinse_s = burring.clogging_params.rinse_s = 2.0;
+  EffectMoment moment{.spindle_rpm = 1000, .engaged = 1.0, .density_g_cm3 = 1.9, .cutting = true, .advance_mm = 0.01};
+  for (int i = 0; i < 4000; ++i) drilling.step(moment, kDt);
+  ASSERT_EQ(drilling.clogging().level(), 1.0);
+  moment.cutting = false;
+  moment.advance_mm = 0.0;
+  moment.irrigation = true;
+  const int half = static_cast<int>(std::ceil(2.0 * std::numbers::ln2 / kDt));
+  for (int i = 0; i < half / 2; ++i) drilling.step(moment, kDt);
+  // Half of the way in time: 1 / sqrt 2 in the flutes, and 1 + 5 (0.7071 - 0.5) / 0.5 times the torque.
+  EXPECT_NEAR(drilling.torque_nmm(10.0), 10.0 * (1.0 + 10.0 * (std::numbers::sqrt2 / 2.0 - 0.5)), 0.05);
+  for (int i = half / 2; i < half; ++i) drilling.step(moment, kDt);
+  EXPECT_EQ(drilling.torque_nmm(10.0), 10.0);
+  EXPECT_NEAR(drilling.clogging().level(), 0.5, 1e-3);
+  // Without water the chips stay.
+  const double left = drilling.clogging().level();
+  moment.irrigation = false;
+  for (int i = 0; i < 1000; ++i) drilling.step(moment, kDt);
+  EXPECT_EQ(drilling.clogging().level(), left);
+
+  moment.cutting = moment.irrigation = true;
+  moment.advance_mm = 0.01;
+  for (int i = 0; i < 4000; ++i) burring.step(moment, kDt);
+  EXPECT_EQ(burring.clogging().level(), 0.0);
+  EXPECT_EQ(burring.torque_nmm(10.0), 10.0);
 }
 
 TEST(CuttingEffects, AJammedSawStandsAndABroachWaitsForItsBlow) {

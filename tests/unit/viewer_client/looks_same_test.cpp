@@ -39,6 +39,9 @@ TEST(LooksSame, WhateverAGaugeShowsCounts) {
   EXPECT_TRUE(differs([](CuttingState& s) { s.tool_name = "drill-4.5"; }));
   EXPECT_TRUE(differs([](CuttingState& s) { s.phase = CuttingPhase::cutting; }));
   EXPECT_TRUE(differs([](CuttingState& s) { s.on_metal = true; }));
+  EXPECT_TRUE(differs([](CuttingState& s) { s.irrigation = true; }));
+  EXPECT_TRUE(differs([](CuttingState& s) { s.suction = true; }));
+  EXPECT_TRUE(differs([](CuttingState& s) { s.flutes_full = 0.01; }));
   EXPECT_TRUE(differs([](CuttingState& s) { s.pose_bone_device.position_mm.z() += 0.01; }));
   EXPECT_TRUE(differs([](CuttingState& s) { s.spindle_rpm = 1; }));
   EXPECT_TRUE(differs([](CuttingState& s) { s.force_physical_N = {0, 0, 0.1}; }));

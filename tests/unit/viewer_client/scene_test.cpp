@@ -370,6 +370,11 @@ TEST(Gauges, NameToolForceAndDepth) {
   state.phase = CuttingPhase::rubbing;
   state.on_metal = true;
   EXPECT_NE(gauge_text(state).find("\non metal: it does not cut\n"), std::string::npos) << gauge_text(state);
+  state.on_metal = false;
+  state.irrigation = state.suction = true;
+  state.flutes_full = 0.62;
+  EXPECT_NE(gauge_text(state).find("\ndepth 0.0 mm\nflutes 62 % full\nirrigation\nsuction\n"), std::string::npos)
+      << gauge_text(state);
 }
 
 }  // namespace

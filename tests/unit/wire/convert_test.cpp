@@ -49,6 +49,8 @@ TEST(Wire, AStateComesBack) {
   state.on_metal = true;
   state.force_hand_N = 0.5;
   state.device_holds_N = 0.875;
+  state.suction = true;
+  state.flutes_full = 0.375;
   const auto back = wire::from_wire(wire::to_wire(state));
   ASSERT_TRUE(back) << back.error().message;
   EXPECT_EQ(back->state_seq, 99u);
@@ -57,8 +59,26 @@ TEST(Wire, AStateComesBack) {
   EXPECT_TRUE(back->on_metal);
   EXPECT_EQ(back->force_hand_N, 0.5);
   EXPECT_EQ(back->device_holds_N, 0.875);
+  EXPECT_FALSE(back->irrigation);
+  EXPECT_TRUE(back->suction);
+  EXPECT_EQ(back->flutes_full, 0.375);
   EXPECT_EQ(back->force_physical_N, state.force_physical_N);
   EXPECT_LT((back->pose_bone_tool.position_mm - state.pose_bone_tool.position_mm).norm(), 1e-9);
+}
+
+// What a client of an older version sends has no such fields.
+TEST(Wire, AStateWithoutTheOtherHandHasNone) {
+  v1::CuttingState sent = wire::to_wire(CuttingState{});
+  for (const bool irrigation : {false, true}) {
+    sent.set_irrigation(irrigation);
+    const auto back = wire::from_wire(sent);
+    ASSERT_TRUE(back) << back.error().message;
+    EXPECT_EQ(back->irrigation, irrigation);
+    EXPECT_FALSE(back->suction);
+    EXPECT_EQ(back->flutes_full, 0.0);
+  }
+  sent.set_flutes_full(std::numeric_limits<double>::quiet_NaN());
+  EXPECT_FALSE(wire::from_wire(sent));
 }
 
 // Each change makes a cut that no correct client sends. The message must name the field.

@@ -708,7 +708,8 @@ TEST(ToolState, ComesBackWithinItsSteps) {
   state.torque_Nmm = -12.34;
   state.depth_mm = -3.5;
   state.phase = CuttingPhase::cutting;
-  state.on_metal = true;
+  state.on_metal = state.irrigation = true;
+  state.flutes_full = 0.625;
   state.force_hand_N = 3.25;
   state.device_holds_N = 0.88;
   wire::KnownToolState known;
@@ -717,6 +718,9 @@ TEST(ToolState, ComesBackWithinItsSteps) {
   EXPECT_EQ(known.state.author, state.author);
   EXPECT_EQ(known.buttons, 5u);
   EXPECT_TRUE(known.state.on_metal);
+  EXPECT_TRUE(known.state.irrigation);
+  EXPECT_FALSE(known.state.suction);
+  EXPECT_EQ(known.state.flutes_full, 0.625);
   EXPECT_EQ(known.state.tool_name, state.tool_name);
   EXPECT_EQ(known.state.spindle_rpm, 20000);
   EXPECT_NEAR(known.state.feed_mm_per_s, 1.2345, 0.0005 + 1e-9);
@@ -734,10 +738,15 @@ TEST(ToolState, ComesBackWithinItsSteps) {
   state.state_seq = 100;
   state.pose_bone_tool.position_mm.x() = 7;
   state.force_physical_N = {0, 0, 0};
+  state.irrigation = false;
+  state.suction = true;
   const v1::ToolState pose_only = wire::to_tool_state(state, 0, false);
   ASSERT_TRUE(wire::take_over(pose_only, known).value());
   EXPECT_EQ(known.state.pose_bone_tool.position_mm.x(), 7);
   EXPECT_EQ(known.state.force_physical_N, Vec3(1, -2.5, 3));
+  EXPECT_FALSE(known.state.irrigation);
+  EXPECT_TRUE(known.state.suction);
+  EXPECT_EQ(known.state.flutes_full, 0.625);
   EXPECT_FALSE(wire::take_over(full, known).value());
   EXPECT_EQ(known.state.state_seq, 100u);
   std::printf("a state: %zu B with its effort, %zu B without\n", full.ByteSizeLong(), pose_only.ByteSizeLong());

@@ -295,6 +295,14 @@
         <source>hand</source>
         <translation>Hand</translation>
     </message>
+    <message>
+        <source>Flutes filled</source>
+        <translation>Nuten gefüllt</translation>
+    </message>
+    <message>
+        <source>%1 %</source>
+        <translation>%1 %</translation>
+    </message>
 </context>
 <context>
     <name>ImporterRun</name>
@@ -790,6 +798,30 @@
     <message>
         <source>Warn when the tip is nearer than (mm):</source>
         <translation>Warnen, wenn die Spitze näher ist als, mm</translation>
+    </message>
+    <message>
+        <source>I and U</source>
+        <translation>I und U</translation>
+    </message>
+    <message>
+        <source>irrigation and suction of the other hand, on or off</source>
+        <translation>Spülung und Absaugung der anderen Hand, an oder aus</translation>
+    </message>
+    <message>
+        <source>Irrigation</source>
+        <translation>Spülung</translation>
+    </message>
+    <message>
+        <source>Suction</source>
+        <translation>Absaugung</translation>
+    </message>
+    <message>
+        <source>&amp;Irrigation</source>
+        <translation>&amp;Spülung</translation>
+    </message>
+    <message>
+        <source>S&amp;uction</source>
+        <translation>A&amp;bsaugung</translation>
     </message>
 </context>
 <context>

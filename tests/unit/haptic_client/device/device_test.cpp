@@ -226,6 +226,10 @@ TEST(CombinedDevice, WithAPedalTheHandsSpindleButtonIsAClutch) {
   parts.hand->reading.buttons = 0;
   parts.foot->reading.buttons = kSpindlePedal;
   EXPECT_EQ(parts.all->read().buttons, std::uint32_t{kSpindlePedal});
+  parts.foot->reading.buttons = kIrrigation | kSuction;
+  EXPECT_EQ(parts.all->read().buttons, std::uint32_t{kIrrigation | kSuction});
+  parts.foot->reading.status = DeviceStatus::absent;
+  EXPECT_EQ(parts.all->read().buttons, 0u);
 }
 
 TEST(CombinedDevice, NeitherHandNorRotationMayBeMissing) {

@@ -76,6 +76,24 @@ TEST(FootPedal, SwitchAndAxisAreChosenByWords) {
     EXPECT_EQ(options->switches, switches);
   }
   EXPECT_FALSE(read_pedal_switch("both"));
+  struct Pedals {
+    std::string_view words;
+    int spindle, irrigation, suction;
+  };
+  for (const Pedals& pedals : {Pedals{"left:irrigation-right", 1, 4, 0},
+                               {"irrigation-right", 3, 4, 0},
+                               {"suction-middle", 5, 0, 2},
+                               {"suction-left:irrigation-middle", 4, 2, 1},
+                               {"irrigation-left:right:suction-middle", 4, 1, 2}}) {
+    const auto options = read_pedal_switch(pedals.words);
+    ASSERT_TRUE(options) << pedals.words;
+    EXPECT_EQ(options->switches, pedals.spindle) << pedals.words;
+    EXPECT_EQ(options->irrigation, pedals.irrigation) << pedals.words;
+    EXPECT_EQ(options->suction, pedals.suction) << pedals.words;
+  }
+  for (const char* wrong : {"left:", ":left", "left:right", "left:irrigation-left", "irrigation-left:irrigation-right",
+                            "irrigation-", "irrigation", "suction-left:left:right"})
+    EXPECT_FALSE(read_pedal_switch(wrong)) << wrong;
 
   struct Said {
     std::string_view words;

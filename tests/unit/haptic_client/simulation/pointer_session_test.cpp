@@ -99,6 +99,36 @@ TEST_F(PointedHand, RestsAboveTheBoneAndCutsNothingThere) {
   EXPECT_GT(last.report.spindle_rpm, 500.0);
 }
 
+TEST_F(PointedHand, TheOtherHandIrrigatesAndSucksWhileTheWindowLives) {
+  begin();
+  command_.irrigation = true;
+  const SessionTick first = run(200);
+  EXPECT_EQ(first.reading.buttons & (kIrrigation | kSuction), std::uint32_t{kIrrigation});
+  command_.irrigation = false;
+  command_.suction = true;
+  EXPECT_EQ(run(200).reading.buttons & (kIrrigation | kSuction), std::uint32_t{kSuction});
+  // A window that is gone holds neither.
+  sends_ = false;
+  EXPECT_EQ(run(PointerSession::kSilentTicks + 200).reading.buttons & (kIrrigation | kSuction), 0u);
+}
+
+// Both hands drill to the same place. The one that irrigates has fewer chips in its flutes.
+TEST_F(PointedHand, IrrigationReachesTheToolsFlutes) {
+  double full[2] = {};
+  for (const bool irrigation : {false, true}) {
+    begin();
+    command_.irrigation = irrigation;
+    run(1500);
+    press(6000, [&](const SessionTick& now) {
+      if (depth(now) < 4.0) full[irrigation] = std::max(full[irrigation], now.report.cutting.flutes_full);
+    });
+    let_go(10);
+  }
+  std::printf("flutes: %.3f dry, %.3f under irrigation\n", full[0], full[1]);
+  EXPECT_GT(full[0], 0.05);
+  EXPECT_LT(full[1], full[0]);
+}
+
 TEST_F(PointedHand, WaitsAboveTheBoneUntilThePointerMeetsIt) {
   begin();
   command_.on_bone = false;

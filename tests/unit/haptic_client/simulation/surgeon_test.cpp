@@ -147,6 +147,10 @@ TEST(Plan, HasADigestOfItsOwn) {
   EXPECT_NE(changed([](PlanStep& s) { s.entry.point_mm = Vec3(1.1, -0.2, 0); }), own);
   EXPECT_NE(changed([](PlanStep& s) { s.hand = HandKind::expert; }), own);
   EXPECT_NE(changed([](PlanStep& s) { s.hand_across_n_per_mm = 0.3; }), own);
+  const std::string rinsed = changed([](PlanStep& s) { s.irrigation = true; });
+  EXPECT_NE(rinsed, own);
+  EXPECT_NE(changed([](PlanStep& s) { s.suction = true; }), own);
+  EXPECT_NE(changed([](PlanStep& s) { s.suction = true; }), rinsed);
   // A different tool of the same name.
   EXPECT_NE(digest({step},
                    [](std::string_view name) -> Result<Tool> {
