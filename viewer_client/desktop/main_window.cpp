@@ -681,6 +681,7 @@ void MainWindow::closeEvent(QCloseEvent* event) {
     say(tr("The window closes when the bone is saved. Close it once more to give that up."));
     return event->ignore();
   }
+  saver_.reset();
   QSettings settings;
   settings.setValue("window/geometry", saveGeometry());
   settings.setValue("window/state", saveState());
