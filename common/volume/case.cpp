@@ -384,6 +384,8 @@ Result<Case> Case::load(const std::filesystem::path& folder) {
                                              0.0,
                                              {},
                                              {}});
+  if (!has_inside(*grids))
+    return bad_input((folder / kVolumeFile).string() + " is empty: no sample lies in bone; import the case again");
   if (content_hash(*grids) != named)
     return failure(ErrorCode::invalid_input, folder.string() + ": the content does not match content_hash of " +
                                                  kInfoFile + "; import the case again");

@@ -518,7 +518,7 @@ Result<CaseDescription> read_description(const std::filesystem::path& file) {
       return failure(ErrorCode::unsupported, file.string() + ": schema_version is " + version.dump().substr(0, 20) +
                                                  ", but this program reads the versions 1 to " +
                                                  std::to_string(kCaseSchemaVersion) +
-                                                 "; import the case again with this program's osteon-import");
+                                                 "; install a newer Osteon, or import the case again with this one");
     CaseDescription read = read_all(root, version == 1 ? 1 : kCaseSchemaVersion);
     if (const Result<void> sound = check_description(read.info); !sound) throw Fault{sound.error().message};
     return read;

@@ -7,6 +7,8 @@
 #include <QVBoxLayout>
 #include <utility>
 
+#include "viewer_client/desktop/sound_dialog.hpp"
+
 namespace osteon {
 
 namespace {
@@ -86,13 +88,9 @@ QStringList advice_of(const ConnectionState& state) {
   if (state.address.isEmpty() && !state.practice) return {PanelText::tr("Open a bone or join a room.")};
   if (state.interrupted && !state.practice)
     lines << PanelText::tr("Check the network to %1. The window connects again by itself.").arg(state.address);
-  const auto ended = [&](const ProgramState& program, const QString& name) {
-    if (!program.why.isEmpty() && program.phase != ProgramState::Phase::runs)
-      lines << PanelText::tr("%1 said: %2").arg(name, program.why);
-  };
-  ended(state.server, "osteon-server");
-  ended(state.haptic, "osteon-haptic");
-  ended(state.audio, "osteon-audio");
+  // Each sentence names its program.
+  for (const ProgramState* program : {&state.server, &state.haptic, &state.audio})
+    if (!program->why.isEmpty() && program->phase != ProgramState::Phase::runs) lines << program->why;
   if (state.practice && state.joined) {
     if (!state.pointer_connected)
       lines << PanelText::tr("Wait some seconds: the haptic client makes its tools ready.");
@@ -100,7 +98,7 @@ QStringList advice_of(const ConnectionState& state) {
       lines << PanelText::tr("The haptic client is silent. Close other programs that use the processor.");
   }
   if (state.sound_on && state.sound && !state.sound->trouble.empty()) {
-    lines << PanelText::tr("No sound device: %1").arg(QString::fromStdString(state.sound->trouble));
+    lines << PanelText::tr("No sound device: %1").arg(sound_trouble(state.sound->trouble));
     lines << PanelText::tr("Without loudspeakers, switch the sound off: Tools > Sound.");
   }
   return lines;

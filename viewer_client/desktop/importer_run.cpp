@@ -53,7 +53,9 @@ void ImporterRun::read_progress() {
 
 void ImporterRun::ended(int code) {
   progress_timer_.stop();
-  const QString why = importer_->last_sentence();
+  // One that was killed has said nothing but its progress.
+  const QString why =
+      code < 0 ? tr("osteon-import was ended by force or crashed. Try again.") : importer_->last_sentence();
   QFile::remove(log_file_);
   if (code == 0) return events_.done(QString::fromUtf8(importer_->readAllStandardOutput()));
   events_.failed(cancelled_ ? QString() : why.isEmpty() ? tr("osteon-import ended without a result.") : why);

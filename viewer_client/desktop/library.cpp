@@ -5,9 +5,12 @@
 #include <QFile>
 #include <QJsonDocument>
 #include <QJsonObject>
+#include <QLocale>
 #include <QSettings>
 #include <QStandardPaths>
 #include <utility>
+
+#include "viewer_client/desktop/file_lock.hpp"
 
 namespace osteon {
 
@@ -49,9 +52,17 @@ std::filesystem::path example_folder(const ExampleBone& bone) { return cases_fol
 std::filesystem::path new_session_folder(const std::filesystem::path& bone) {
   const std::string day = QDateTime::currentDateTime().toString("yyyy-MM-dd-HHmmss").toStdString();
   const std::filesystem::path base = data_folder() / "sessions" / (day + "-" + bone.filename().string());
+  std::error_code error;
+  std::filesystem::create_directories(base.parent_path(), error);
   std::filesystem::path free = base;
-  for (int n = 2; std::filesystem::exists(free); ++n) free = base.string() + "-" + std::to_string(n);
+  for (int n = 2; !std::filesystem::create_directory(free, error) && !error; ++n)
+    free = base.string() + "-" + std::to_string(n);
   return free;
+}
+
+bool is_name_of_unpacked(std::string_view name) {
+  constexpr std::size_t kHashLetters = 64;
+  return name.size() == kHashLetters && name.find_first_not_of("0123456789abcdef") == std::string_view::npos;
 }
 
 bool is_file(const std::filesystem::path& path) {
@@ -74,44 +85,80 @@ QString case_title(const std::filesystem::path& bone) {
   return title.isEmpty() ? text_of(bone.filename()) : title;
 }
 
-std::vector<RecentEntry> recent_entries() {
-  QSettings settings;
+namespace {
+
+// As they are kept. Where `name` and `opened` are missing, an older window has kept the title.
+std::vector<RecentEntry> kept_entries(QSettings& settings) {
   std::vector<RecentEntry> entries;
   const int count = settings.beginReadArray("recent");
   for (int i = 0; i < count; ++i) {
     settings.setArrayIndex(i);
-    RecentEntry entry{settings.value("title").toString(), path_of(settings.value("bone").toString()),
-                      path_of(settings.value("session").toString())};
-    if (is_case(entry.bone)) entries.push_back(std::move(entry));
+    entries.push_back({settings.value("title").toString(), path_of(settings.value("bone").toString()),
+                       path_of(settings.value("session").toString()), settings.value("name").toString(),
+                       settings.value("opened").toDateTime()});
   }
   settings.endArray();
   return entries;
 }
 
+}  // namespace
+
+std::vector<RecentEntry> recent_entries() {
+  QSettings settings;
+  std::vector<RecentEntry> entries = kept_entries(settings);
+  std::erase_if(entries, [](const RecentEntry& entry) { return !is_case(entry.bone); });
+  for (RecentEntry& entry : entries)
+    if (entry.opened.isValid())
+      entry.title = QCoreApplication::translate("Library", "%1, %2")
+                        .arg(entry.name.isEmpty() ? case_title(entry.bone) : entry.name,
+                             QLocale().toString(entry.opened, QLocale::ShortFormat));
+  return entries;
+}
+
+std::vector<std::filesystem::path> remembered_bones() {
+  QSettings settings;
+  std::vector<std::filesystem::path> bones;
+  for (RecentEntry& entry : kept_entries(settings)) bones.push_back(std::move(entry.bone));
+  return bones;
+}
+
 void remember(const RecentEntry& entry) {
-  std::vector<RecentEntry> entries = recent_entries();
+  std::error_code ignored;
+  std::filesystem::create_directories(data_folder(), ignored);
+  FileLock lock(data_folder() / "recent.lock");
+  lock.wait_alone();
+  QSettings settings;
+  settings.sync();  // what another window has written meanwhile
+  std::vector<RecentEntry> entries = kept_entries(settings);
   std::erase_if(entries, [&](const RecentEntry& old) { return old.session == entry.session; });
   entries.insert(entries.begin(), entry);
   if (entries.size() > kMostRecent) entries.resize(kMostRecent);
-  QSettings settings;
   settings.beginWriteArray("recent", static_cast<int>(entries.size()));
   for (int i = 0; i < static_cast<int>(entries.size()); ++i) {
     settings.setArrayIndex(i);
-    settings.setValue("title", entries[i].title);
+    const bool older = !entries[i].opened.isValid();
+    older ? settings.setValue("title", entries[i].title) : settings.remove("title");
     settings.setValue("bone", text_of(entries[i].bone));
     settings.setValue("session", text_of(entries[i].session));
+    settings.setValue("name", entries[i].name);
+    settings.setValue("opened", entries[i].opened);
   }
   settings.endArray();
+  settings.sync();  // before the lock ends
 }
 
 CaseMaker::CaseMaker(QStringList how, std::filesystem::path out, Events events)
     : out_(std::move(out)), events_(std::move(events)) {
-  const std::filesystem::path log =
-      out_.empty() ? cases_folder() / ("unpack-" + std::to_string(QCoreApplication::applicationPid())) : out_;
+  const std::filesystem::path log = out_.empty() ? cases_folder() / "unpack" : out_;
   how += out_.empty() ? QStringList{"--into", text_of(cases_folder())} : QStringList{"--out", text_of(out_)};
   run_ = std::make_unique<ImporterRun>(
-      how, text_of(log) + ".log",
-      ImporterRun::Events{events_.progress, [this](const QString& said) { ended(said); }, events_.failed});
+      how, text_of(log) + '-' + QString::number(QCoreApplication::applicationPid()) + ".log",
+      ImporterRun::Events{events_.progress, [this](const QString& said) { ended(said); },
+                          [this](const QString& sentence) {
+                            // Another window may have made the same one meanwhile.
+                            const bool there = !sentence.isEmpty() && !out_.empty() && is_case(out_);
+                            there ? events_.made(out_) : events_.failed(sentence);
+                          }});
 }
 
 void CaseMaker::start() { run_->start(); }

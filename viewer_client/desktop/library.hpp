@@ -2,11 +2,13 @@
 // user's data folder, $XDG_DATA_HOME/osteon.
 #pragma once
 #include <QCoreApplication>
+#include <QDateTime>
 #include <QString>
 #include <QStringList>
 #include <filesystem>
 #include <functional>
 #include <memory>
+#include <string_view>
 #include <vector>
 
 #include "viewer_client/desktop/importer_run.hpp"
@@ -22,20 +24,28 @@ struct ExampleBone {
 // The skull from CT first, if its scan is installed; then the phantoms.
 [[nodiscard]] std::vector<ExampleBone> example_bones();
 
-// A bone or a session that was opened before.
+// A session that was opened before.
 struct RecentEntry {
-  QString title;
-  std::filesystem::path bone;     // folder of the case
-  std::filesystem::path session;  // its folder
+  QString title{};                  // for people, in the language of the window
+  std::filesystem::path bone{};     // folder of the case
+  std::filesystem::path session{};  // its folder
+  QString name{};                   // of the file that was opened; empty: the title of the case
+  QDateTime opened{};               // first
 };
-// Newest first; only those whose case is still there.
+// Newest first; only those whose case is there now.
 [[nodiscard]] std::vector<RecentEntry> recent_entries();
+// Its `title` is not kept. Other windows may do the same at the same time.
 void remember(const RecentEntry& entry);
+// The cases of all sessions that the start page knows, there or not.
+[[nodiscard]] std::vector<std::filesystem::path> remembered_bones();
 
 [[nodiscard]] std::filesystem::path data_folder();
 [[nodiscard]] std::filesystem::path cases_folder();                           // of the cases that the window has made
 [[nodiscard]] std::filesystem::path example_folder(const ExampleBone& bone);  // of its case
+// Made at once, so that no other window takes the same one. If it cannot be made, it is not there.
 [[nodiscard]] std::filesystem::path new_session_folder(const std::filesystem::path& bone);
+// "unpack --into" names a folder so, by the SHA-256 of the file. An import never does.
+[[nodiscard]] bool is_name_of_unpacked(std::string_view name);
 // The title of a case, or the name of its folder. That of an example is translated.
 [[nodiscard]] QString case_title(const std::filesystem::path& bone);
 [[nodiscard]] bool is_case(const std::filesystem::path& folder);

@@ -88,7 +88,7 @@ int main(int argc, char** argv) {
   QTimer stopping;
   QObject::connect(&stopping, &QTimer::timeout, [&] {
     if (!stop.requested()) return;
-    window.close();
+    if (!window.close()) window.close();  // it does not wait for a file that is being saved
     QApplication::quit();
   });
   stopping.start(kStopPeriod_ms);

@@ -54,10 +54,12 @@ constexpr int kPointerPeriod_ms = 50;
 constexpr int kCapPeriod_ms = 16;
 constexpr int kMessage_ms = 8000;
 constexpr double kMostRiskLimit_mm = 50.0;
+constexpr double kSamePlace_mm = 1.0;
 constexpr const char* kFirstTool = "drill-3.2";
 
 // What changes the room, beside the tools.
 constexpr const char* kWorkActions[] = {"undo", "redo", "mark", "put_down", "spindle", "irrigation", "suction"};
+constexpr const char* kOpeningActions[] = {"open_case", "import_scan", "join_room"};
 
 // The first file or folder that somebody drags over the window. Empty: none on this computer.
 std::filesystem::path dragged_path(const QMimeData& data) {
@@ -78,12 +80,15 @@ MainWindow::MainWindow() {
   setObjectName("osteon");
   resize(1280, 800);
   setAcceptDrops(true);
+  sockets_ = QStandardPaths::writableLocation(QStandardPaths::RuntimeLocation).toStdString();
+  leftovers_ = std::make_unique<Leftovers>(sockets_);
   pages_ = new QStackedWidget;
   start_ = new StartPage({[this](const ExampleBone& bone) { open_example(bone); },
                           [this](const RecentEntry& entry) { practise(entry.bone, entry.session); },
                           [this] { choose_case(); }, [this] { choose_scan(); }, [this] { choose_room(); },
                           [this] {
-                            if (maker_) maker_->cancel();
+                            if (maker_) return maker_->cancel();
+                            leave_room();  // a room that does not answer
                           }});
   view_ = new BoneView;
   view_->setObjectName("bone");
@@ -203,16 +208,19 @@ void MainWindow::make_case(const QString& what, const QStringList& how, const st
   if (maker_) return;
   start_->show_work(what);
   pages_->setCurrentWidget(start_);
+  enable_opening(false);
   maker_ = std::make_unique<CaseMaker>(
       how, out,
       CaseMaker::Events{[this](int percent) { start_->show_progress(percent); },
                         [this, name](const std::filesystem::path& bone) {
                           maker_.release()->deleteLater();
+                          enable_opening(true);
                           start_->end_work({});
                           practise(bone, {}, name);
                         },
                         [this](const QString& sentence) {
                           maker_.release()->deleteLater();
+                          enable_opening(true);
                           start_->end_work(sentence.isEmpty() ? tr("Cancelled. Nothing was written.") : sentence);
                         }});
   maker_->start();
@@ -226,8 +234,10 @@ void MainWindow::open_example(const ExampleBone& bone) {
 }
 
 void MainWindow::import_scan(const QString& source) {
+  if (maker_) return;
   leave_room();
-  const QString name = QFileInfo(source).completeBaseName().isEmpty() ? "case" : QFileInfo(source).completeBaseName();
+  QString name = QFileInfo(source).completeBaseName();
+  if (name.isEmpty() || is_name_of_unpacked(name.toStdString())) name = "case";
   std::filesystem::path out = data_folder() / "cases" / name.toStdString();
   for (int n = 2; std::filesystem::exists(out); ++n)
     out = data_folder() / "cases" / (name.toStdString() + "-" + std::to_string(n));
@@ -246,7 +256,6 @@ void MainWindow::choose_case() {
   if (chosen.isEmpty()) return;
   const std::filesystem::path path = chosen.toStdString();
   if (path.filename() != "case.json") return open_case_file(path);
-  leave_room();
   practise(path.parent_path());
 }
 
@@ -274,13 +283,17 @@ void MainWindow::save_case_file(const QString& file) {
   const auto end = [this](const QString& sentence) {
     saver_.release()->deleteLater();
     say(sentence);
+    if (std::exchange(closes_when_saved_, false)) close();
   };
   // The dialog has asked whether to write over a file that is there.
   saver_ = std::make_unique<ImporterRun>(
       QStringList{"pack", "--replace", text_of(opened_->bone), file}, log,
       ImporterRun::Events{[this, file](int percent) { say(tr("Saving %1: %2 %").arg(file, QString::number(percent))); },
                           [end, file](const QString&) { end(tr("Saved %1.").arg(file)); },
-                          [end](const QString& why) { end(why); }});
+                          [this, end](const QString& why) {
+                            closes_when_saved_ = false;  // the user is to read it, and to try again
+                            end(why);
+                          }});
   saver_->start();
 }
 
@@ -294,6 +307,7 @@ void MainWindow::dropEvent(QDropEvent* event) {
   event->acceptProposedAction();
   // Later, so that the program from which it comes need not wait.
   QTimer::singleShot(0, this, [this, path] {
+    if (maker_) return;
     if (is_case(path)) return practise(path);
     if (is_file(path) && path.extension() == ".osteon") return open_case_file(path);
     say(tr("%1 is no case: drop an .osteon file, or the folder of a case.").arg(text_of(path)));
@@ -335,6 +349,10 @@ void MainWindow::choose_room() {
   join({address->text(), room->text(), name->text(), *credentials});
 }
 
+void MainWindow::enable_opening(bool on) {
+  for (const char* name : kOpeningActions) findChild<QAction*>(name)->setEnabled(on);
+}
+
 void MainWindow::practise(const std::filesystem::path& bone, const std::filesystem::path& session,
                           const QString& name) {
   leave_room();
@@ -347,18 +365,15 @@ void MainWindow::practise(const std::filesystem::path& bone, const std::filesyst
   QDir().mkpath(text_of(options.cache));
 
   // A socket's path has at most 107 characters, so it is in the folder of this login and not beside the session.
-  const QString runtime = QStandardPaths::writableLocation(QStandardPaths::RuntimeLocation);
-  options.pointer = (runtime + "/osteon-pointer-" + QString::number(QCoreApplication::applicationPid())).toStdString();
+  options.pointer = socket_path(sockets_, "pointer");
   auto pointer = PointerServer::listen(options.pointer);
   if (!pointer) return room_ended(QString::fromStdString(pointer.error().message));
   pointer_ = std::move(*pointer);
-  options.sound_socket =
-      (runtime + "/osteon-sound-" + QString::number(QCoreApplication::applicationPid())).toStdString();
+  options.sound_socket = socket_path(sockets_, "sound");
   if (const auto sound = sound_control_->listen(options.sound_socket); !sound)
     return room_ended(QString::fromStdString(sound.error().message));
   const QString title = name.isEmpty() ? case_title(bone) : name;
-  opened_ = RecentEntry{tr("%1, %2").arg(title, QLocale().toString(QDateTime::currentDateTime(), QLocale::ShortFormat)),
-                        bone, options.folder};
+  opened_ = RecentEntry{title, bone, options.folder, name, QDateTime::currentDateTime()};
   if (!session.empty())
     for (const RecentEntry& entry : recent_entries())
       if (entry.session == session) opened_ = entry;
@@ -375,11 +390,16 @@ void MainWindow::practise(const std::filesystem::path& bone, const std::filesyst
 
 void MainWindow::room_opened(const QString& address) {
   if (room_) return;  // the server is back at its address; the link finds it by itself
-  join({address, {}, {}, {}});
+  enter_room({address, {}, {}, {}});
 }
 
 void MainWindow::join(const RoomAddress& room) {
-  if (!practice_) leave_room();
+  leave_room();
+  start_->show_work(tr("Joining the room at %1").arg(room.address));
+  enter_room(room);
+}
+
+void MainWindow::enter_room(const RoomAddress& room) {
   address_ = room.address;
   room_name_ = room.room;
   RoomSubscriptionOptions options;
@@ -398,7 +418,6 @@ void MainWindow::join(const RoomAddress& room) {
 }
 
 void MainWindow::watch(const RoomAddress& room) {
-  leave_room();
   join(room);
   set_watching(true);
 }
@@ -413,6 +432,7 @@ void MainWindow::set_watching(bool on) {
 }
 
 void MainWindow::show_joined(const WatchedRoom& room) {
+  start_->end_work({});
   view_->show_room(&room_->queue(), room.bounds);
   clipping_->reset(room.bounds);
   view_options_->show_bone(QString::fromStdString(room.case_title));
@@ -455,6 +475,7 @@ void MainWindow::leave_room() {
   room_name_.clear();
   setWindowTitle("Osteon");
   for (QLabel* label : {other_hand_, device_, position_, connection_}) label->clear();
+  if (!maker_) start_->end_work({});
   start_->refresh();
   pages_->setCurrentWidget(start_);
 }
@@ -507,6 +528,12 @@ void MainWindow::rest_other_hand() {
 
 void MainWindow::place_item(const SurfaceHit& hit) {
   if (placing_.empty()) return;
+  // The second click of a double click is not for a second item in the same hole.
+  const bool again = placed_mm_ && (*placed_mm_ - hit.point_mm).norm() < kSamePlace_mm &&
+                     !since_placed_.hasExpired(QApplication::doubleClickInterval());
+  if (again) return;
+  placed_mm_ = hit.point_mm;
+  since_placed_.start();
   ItemPlace where;
   where.point_mm = hit.point_mm;
   where.on_bone = true;
@@ -536,7 +563,8 @@ void MainWindow::mark_before(const QString& what) {
   if (!room_) return;
   room_->ask([label = what.toStdString()](RoomSubscription& room) { return room.mark(label); },
              [this](const Result<RoomAnswer>& answer) {
-               if (answer) undo_points_.push_back(answer->place);
+               if (!answer) return say(QString::fromStdString(answer.error().message));  // such as a full disk
+               undo_points_.push_back(answer->place);
              });
 }
 
@@ -669,6 +697,12 @@ void MainWindow::choose_risk_limit() {
 }
 
 void MainWindow::closeEvent(QCloseEvent* event) {
+  if (saver_ && !closes_when_saved_) {
+    closes_when_saved_ = true;
+    say(tr("The window closes when the bone is saved. Close it once more to give that up."));
+    return event->ignore();
+  }
+  saver_.reset();
   QSettings settings;
   settings.setValue("window/geometry", saveGeometry());
   settings.setValue("window/state", saveState());

@@ -12,6 +12,7 @@
 #include "common/input/pointer_link.hpp"
 #include "common/input/space_mouse.hpp"
 #include "common/wire/credentials.hpp"
+#include "viewer_client/desktop/leftovers.hpp"
 #include "viewer_client/desktop/library.hpp"
 #include "viewer_client/desktop/practice_room.hpp"
 #include "viewer_client/desktop/room_link.hpp"
@@ -55,7 +56,8 @@ class MainWindow : public QMainWindow {
   void practise(const std::filesystem::path& bone, const std::filesystem::path& session = {}, const QString& name = {});
   // A case in one file. It is unpacked into the user's data folder first, once for each content.
   void open_case_file(const std::filesystem::path& file);
-  // The case of the practice room as one file. Goes on in the background.
+  // The case of the practice room as one file. Goes on in the background. A window that is closed meanwhile waits for
+  // its end; closed once more, it leaves the file as it was.
   void save_case_file(const QString& file);
   void open_example(const ExampleBone& bone);
   void join(const RoomAddress& room);
@@ -94,6 +96,7 @@ class MainWindow : public QMainWindow {
   void choose_case();
   void save_bone_as();
   void choose_room();
+  void enter_room(const RoomAddress& room);
   void leave_room();
   void room_opened(const QString& address);
   void show_joined(const WatchedRoom& room);
@@ -117,6 +120,8 @@ class MainWindow : public QMainWindow {
   void choose_risk_limit();
   void say(const QString& sentence);
   void enable_room_actions(bool on);
+  // What opens something else. Not while a case is made, which then opens by itself.
+  void enable_opening(bool on);
   void set_watching(bool on);
 
   QStackedWidget* pages_ = nullptr;
@@ -134,6 +139,8 @@ class MainWindow : public QMainWindow {
   std::vector<QAction*> room_actions_;
   QAction *sound_ = nullptr, *spindle_ = nullptr, *irrigation_ = nullptr, *suction_ = nullptr;
 
+  std::filesystem::path sockets_;
+  std::unique_ptr<Leftovers> leftovers_;  // outlives the programs below
   std::unique_ptr<CaseMaker> maker_;
   std::unique_ptr<ImporterRun> saver_;
   std::unique_ptr<PointerServer> pointer_;
@@ -143,7 +150,10 @@ class MainWindow : public QMainWindow {
   std::vector<RoomSeq> undo_points_;  // before each push and each item, oldest first
   std::string first_tool_;            // that the hand takes in the next room; empty: none
   bool watching_ = false;
+  bool closes_when_saved_ = false;
   std::string placing_;  // the item that the next click places
+  std::optional<Vec3> placed_mm_;
+  QElapsedTimer since_placed_;
   QString address_, room_name_;
   QTimer gauge_timer_, pointer_timer_, cap_timer_;
   QElapsedTimer clock_, capped_;  // capped_: since the SpaceMouse was asked last

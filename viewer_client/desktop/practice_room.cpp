@@ -47,7 +47,18 @@ void PracticeRoom::fail(const QString& sentence) {
 void PracticeRoom::start() {
   if (!QDir().mkpath(text_of(options_.folder / "logs")))
     return fail(tr("Cannot make the folder %1. Choose a place where you may write.").arg(text_of(options_.folder)));
+  session_ = std::make_unique<FileLock>(options_.folder / "window.lock");
+  if (session_->usable() && !session_->try_alone())
+    return fail(tr("Another window has this session open. Close it there first."));
   start_server();
+}
+
+QString PracticeRoom::end_of(const ChildProcess& child) {
+  const QString name = child.program().section('/', -1);
+  // The last line of a program that was killed is about something else.
+  if (child.exitStatus() == QProcess::CrashExit) return tr("%1 was ended by force or crashed.").arg(name);
+  const QString said = child.last_sentence();
+  return said.isEmpty() ? tr("%1 ended without a word.").arg(name) : said;
 }
 
 ProgramState PracticeRoom::state_of(const ChildProcess* child, const Past& past) {
@@ -132,8 +143,8 @@ void PracticeRoom::want_sound() {
 void PracticeRoom::server_ended() {
   if (over_) return;
   address_timer_.stop();
-  const QString why = server_past_.why = server_->last_sentence();
-  if (++server_deaths_ >= kMostDeaths || address_.isEmpty()) return fail(why.isEmpty() ? tr("The server ended.") : why);
+  const QString why = server_past_.why = end_of(*server_);
+  if (++server_deaths_ >= kMostDeaths || address_.isEmpty()) return fail(why);
   events_.notice(tr("The server ended and starts again. Nothing that it acknowledged is lost."));
   ++server_past_.restarts;
   QTimer::singleShot(kRestart_ms, this, [this] { start_server(); });
@@ -141,8 +152,8 @@ void PracticeRoom::server_ended() {
 
 void PracticeRoom::haptic_ended() {
   if (over_) return;
-  const QString why = haptic_past_.why = haptic_->last_sentence();
-  if (++haptic_deaths_ >= kMostDeaths) return fail(why.isEmpty() ? tr("The haptic client ended.") : why);
+  const QString why = haptic_past_.why = end_of(*haptic_);
+  if (++haptic_deaths_ >= kMostDeaths) return fail(why);
   events_.notice(tr("The haptic client ended and starts again."));
   ++haptic_past_.restarts;
   QTimer::singleShot(kRestart_ms, this, [this] { start_haptic(); });
@@ -150,11 +161,12 @@ void PracticeRoom::haptic_ended() {
 
 void PracticeRoom::audio_ended() {
   if (over_) return;
-  audio_past_.why = audio_->last_sentence();
+  audio_past_.why = end_of(*audio_);
   if (++audio_deaths_ >= kMostDeaths) {
     audio_past_.given_up = true;
     return events_.notice(tr("There is no sound: %1").arg(audio_past_.why));
   }
+  events_.notice(tr("The audio client ended and starts again."));
   ++audio_past_.restarts;
   QTimer::singleShot(kRestart_ms, this, [this] { start_audio(); });
 }

@@ -11,6 +11,7 @@
 
 #include "viewer_client/desktop/child_process.hpp"
 #include "viewer_client/desktop/connection_panel.hpp"
+#include "viewer_client/desktop/file_lock.hpp"
 
 namespace osteon {
 
@@ -46,6 +47,8 @@ class PracticeRoom : public QObject {
   void want_sound();
 
  private:
+  // Why a program ended, as a sentence that names it.
+  [[nodiscard]] static QString end_of(const ChildProcess& child);
   // What became of a program before.
   struct Past {
     int restarts = 0;
@@ -71,6 +74,7 @@ class PracticeRoom : public QObject {
   QString address_;
   // of children that died soon after their start, one after the other
   int server_deaths_ = 0, haptic_deaths_ = 0, audio_deaths_ = 0;
+  std::unique_ptr<FileLock> session_;  // while the room is there
   bool over_ = false;
   Past server_past_, haptic_past_, audio_past_;
   std::unique_ptr<ChildProcess> server_, haptic_, audio_;

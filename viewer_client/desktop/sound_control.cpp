@@ -65,8 +65,7 @@ void SoundControl::refresh() {
   const std::optional<SoundReport> heard = report();
   if (heard && heard->trouble != trouble_) {
     trouble_ = heard->trouble;
-    if (!trouble_.empty() && chosen_.on)
-      events_.notice(tr("There is no sound: %1").arg(QString::fromStdString(trouble_)));
+    if (!trouble_.empty() && chosen_.on) events_.notice(tr("There is no sound: %1").arg(sound_trouble(trouble_)));
   }
   if (dialog_ != nullptr && dialog_->isVisible()) dialog_->show_report(heard, missing());
 }

@@ -25,6 +25,16 @@ QString decimals(double value, int count) { return QLocale().toString(value, 'f'
 
 }  // namespace
 
+// Without what an option of the audio client would do, and without PulseAudio's own words, which its log has.
+QString sound_trouble(const std::string& said) {
+  if (said.starts_with("no sound server answers"))
+    return SoundDialog::tr("no sound server answers; start PulseAudio or PipeWire.");
+  if (said.starts_with("the sound server went away"))
+    return SoundDialog::tr("the sound server went away; start it again.");
+  if (said.starts_with("the sound has not begun yet")) return SoundDialog::tr("the sound has not begun yet.");
+  return QString::fromStdString(said);
+}
+
 double amplitude_of(int percent) { return std::pow(std::clamp(percent, 0, 100) / 100.0, 3); }
 
 WavePlot::WavePlot(QWidget* parent) : QWidget(parent) {
@@ -140,7 +150,7 @@ void SoundDialog::show_report(const std::optional<SoundReport>& report, const QS
   text(gaps_, [&] { return QLocale().toString(static_cast<qlonglong>(report->gaps)); });
   text(device_, [&] { return QString::fromStdString(report->device); });
   QString trouble = missing;
-  if (report) trouble = played ? QString() : tr("No sound device: %1").arg(QString::fromStdString(report->trouble));
+  if (report) trouble = played ? QString() : tr("No sound device: %1").arg(sound_trouble(report->trouble));
   if (trouble != trouble_->text()) trouble_->setText(trouble);
 }
 

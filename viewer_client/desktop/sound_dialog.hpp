@@ -6,6 +6,7 @@
 #include <QWidget>
 #include <functional>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "common/input/sound_link.hpp"
@@ -65,5 +66,8 @@ class SoundDialog : public QDialog {
 // The factor of the amplitude for a volume in percent. The ear hears ratios, so it is the third power, as that of the
 // sliders of a desktop.
 [[nodiscard]] double amplitude_of(int percent);
+
+// The trouble of a SoundReport in the language of the window. A sentence that is not known stays as it is.
+[[nodiscard]] QString sound_trouble(const std::string& said);
 
 }  // namespace osteon

@@ -141,10 +141,6 @@
         <translation>Prüfen Sie das Netz zu %1. Das Fenster verbindet sich von selbst wieder.</translation>
     </message>
     <message>
-        <source>%1 said: %2</source>
-        <translation>%1 meldete: %2</translation>
-    </message>
-    <message>
         <source>Wait some seconds: the haptic client makes its tools ready.</source>
         <translation>Warten Sie einige Sekunden: Das Haptikprogramm bereitet die Werkzeuge vor.</translation>
     </message>
@@ -318,6 +314,10 @@
         <source>osteon-import ended without a result.</source>
         <translation>osteon-import endete ohne Ergebnis.</translation>
     </message>
+    <message>
+        <source>osteon-import was ended by force or crashed. Try again.</source>
+        <translation>osteon-import wurde abgebrochen oder ist abgestürzt. Versuchen Sie es noch einmal.</translation>
+    </message>
 </context>
 <context>
     <name>Language</name>
@@ -359,6 +359,10 @@
     <message>
         <source>Pelvis, a phantom</source>
         <translation>Becken, Phantom</translation>
+    </message>
+    <message>
+        <source>%1, %2</source>
+        <translation>%1, %2</translation>
     </message>
 </context>
 <context>
@@ -550,10 +554,6 @@
     <message>
         <source>File of your ticket</source>
         <translation>Datei Ihres Tickets</translation>
-    </message>
-    <message>
-        <source>%1, %2</source>
-        <translation>%1, %2</translation>
     </message>
     <message>
         <source>%1 – Osteon</source>
@@ -823,6 +823,14 @@
         <source>S&amp;uction</source>
         <translation>A&amp;bsaugung</translation>
     </message>
+    <message>
+        <source>Joining the room at %1</source>
+        <translation>Beitritt zum Raum bei %1</translation>
+    </message>
+    <message>
+        <source>The window closes when the bone is saved. Close it once more to give that up.</source>
+        <translation>Das Fenster schließt nach dem Speichern. Noch einmal schließen bricht es ab.</translation>
+    </message>
 </context>
 <context>
     <name>PracticeRoom</name>
@@ -839,20 +847,12 @@
         <translation>osteon-haptic ist nicht installiert. Installieren Sie das Paket osteon.</translation>
     </message>
     <message>
-        <source>The server ended.</source>
-        <translation>Der Server endete.</translation>
-    </message>
-    <message>
         <source>The server ended and starts again. Nothing that it acknowledged is lost.</source>
         <translation>Der Server endete und startet neu. Nichts, was er bestätigt hat, ist verloren.</translation>
     </message>
     <message>
-        <source>The haptic client ended.</source>
-        <translation>Der haptische Client endete.</translation>
-    </message>
-    <message>
         <source>The haptic client ended and starts again.</source>
-        <translation>Der haptische Client endete und startet neu.</translation>
+        <translation>Das Haptikprogramm endete und startet neu.</translation>
     </message>
     <message>
         <source>There is no sound: %1</source>
@@ -861,6 +861,22 @@
     <message>
         <source>osteon-audio is not installed. Install the package osteon.</source>
         <translation>osteon-audio ist nicht installiert. Installieren Sie das Paket osteon.</translation>
+    </message>
+    <message>
+        <source>Another window has this session open. Close it there first.</source>
+        <translation>Ein anderes Fenster hat diese Sitzung. Schließen Sie sie erst dort.</translation>
+    </message>
+    <message>
+        <source>%1 was ended by force or crashed.</source>
+        <translation>%1 wurde gewaltsam beendet oder ist abgestürzt.</translation>
+    </message>
+    <message>
+        <source>%1 ended without a word.</source>
+        <translation>%1 endete ohne ein Wort.</translation>
+    </message>
+    <message>
+        <source>The audio client ended and starts again.</source>
+        <translation>Das Tonprogramm endete und startet neu.</translation>
     </message>
 </context>
 <context>
@@ -1061,6 +1077,18 @@
     <message>
         <source>No sound device: %1</source>
         <translation>Kein Tongerät: %1</translation>
+    </message>
+    <message>
+        <source>no sound server answers; start PulseAudio or PipeWire.</source>
+        <translation>Kein Tonserver antwortet; starten Sie PulseAudio oder PipeWire.</translation>
+    </message>
+    <message>
+        <source>the sound server went away; start it again.</source>
+        <translation>Der Tonserver ist fort; starten Sie ihn neu.</translation>
+    </message>
+    <message>
+        <source>the sound has not begun yet.</source>
+        <translation>Der Ton hat noch nicht begonnen.</translation>
     </message>
 </context>
 <context>

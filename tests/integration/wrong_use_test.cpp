@@ -1,0 +1,681 @@
+// The window in wrong hands: files that are no cases, a full disk, double clicks on everything, a second window, killed
+// programs. It never crashes, loses nothing, and says one sentence.
+#include <gtest/gtest.h>
+#include <signal.h>
+#include <sys/resource.h>
+#include <sys/socket.h>
+#include <sys/un.h>
+#include <unistd.h>
+
+#include <QAbstractButton>
+#include <QAction>
+#include <QApplication>
+#include <QDialog>
+#include <QDockWidget>
+#include <QLabel>
+#include <QListWidget>
+#include <QLocale>
+#include <QMenu>
+#include <QPointer>
+#include <QPushButton>
+#include <QSettings>
+#include <QStatusBar>
+#include <QTest>
+#include <QTimer>
+#include <QToolButton>
+#include <QWindow>
+#include <algorithm>
+#include <cerrno>
+#include <chrono>
+#include <cstdlib>
+#include <fstream>
+#include <map>
+#include <memory>
+#include <optional>
+#include <set>
+#include <sstream>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "common/volume/sparse_volume.hpp"
+#include "server/upload_validation/case_archive.hpp"
+#include "tests/integration/desk.hpp"
+#include "tests/support/failing/failing_writes.hpp"
+#include "tests/support/process.hpp"
+#include "viewer_client/desktop/bone_view.hpp"
+#include "viewer_client/desktop/language.hpp"
+#include "viewer_client/desktop/leftovers.hpp"
+#include "viewer_client/desktop/main_window.hpp"
+#include "viewer_client/desktop/sound_dialog.hpp"
+
+namespace osteon {
+namespace {
+
+using namespace std::chrono_literals;
+using test::Desk;
+namespace fs = std::filesystem;
+
+constexpr auto kPatience = 60s;
+
+std::vector<pid_t> children_of(const std::string& process, const std::string& program) {
+  std::vector<pid_t> found;
+  std::error_code ignored;
+  for (const auto& task : fs::directory_iterator("/proc/" + process + "/task", ignored)) {
+    std::ifstream list(task.path() / "children");
+    for (pid_t pid = 0; list >> pid;) {
+      std::ifstream command("/proc/" + std::to_string(pid) + "/comm");
+      std::string name;
+      std::getline(command, name);
+      if (program.starts_with(name) && !name.empty()) found.push_back(pid);
+    }
+  }
+  return found;
+}
+std::vector<pid_t> children(const std::string& program) { return children_of("self", program); }
+
+// A zombie does not: whoever has to wait for it may never do so.
+bool lives(pid_t pid) {
+  std::ifstream stat("/proc/" + std::to_string(pid) + "/stat");
+  std::string line;
+  std::getline(stat, line);
+  const std::size_t end = line.rfind(')');
+  return end != std::string::npos && line.substr(end + 2, 1) != "Z";
+}
+
+// A number that no program has: that of one that has just ended.
+pid_t dead_pid() {
+  test::Process ended("true", {});
+  const pid_t pid = ended.pid();
+  EXPECT_EQ(ended.wait(10s), 0);
+  return pid;
+}
+
+std::string bytes_of(const fs::path& file) {
+  std::stringstream content;
+  content << std::ifstream(file, std::ios::binary).rdbuf();
+  return content.str();
+}
+void put_bytes(const fs::path& file, const std::string& bytes) { std::ofstream(file, std::ios::binary) << bytes; }
+
+std::set<std::string> names_in(const fs::path& folder) {
+  std::set<std::string> names;
+  std::error_code ignored;
+  for (const auto& entry : fs::directory_iterator(folder, ignored)) names.insert(entry.path().filename().string());
+  return names;
+}
+
+// Files that this program writes end at a size, as if the disk were full. Children that run already do not notice.
+class SmallFiles {
+ public:
+  explicit SmallFiles(rlim_t bytes) : handler_(std::signal(SIGXFSZ, SIG_IGN)) {
+    ::getrlimit(RLIMIT_FSIZE, &before_);
+    const rlimit small{bytes, before_.rlim_max};
+    ::setrlimit(RLIMIT_FSIZE, &small);
+  }
+  ~SmallFiles() {
+    ::setrlimit(RLIMIT_FSIZE, &before_);
+    std::signal(SIGXFSZ, handler_);
+  }
+  SmallFiles(const SmallFiles&) = delete;
+  SmallFiles& operator=(const SmallFiles&) = delete;
+
+ private:
+  rlimit before_{};
+  void (*handler_)(int);
+};
+
+// Writes of children that start from now on fail where the path begins so, as on a full disk.
+class FullDisk {
+ public:
+  FullDisk(const std::string& begin, const fs::path& control) : failing_(begin, control) {
+    auto variables = failing_.options().environment;
+    variables.emplace_back("OSTEON_FAILING_FOLDER", begin);
+    for (const auto& [name, value] : variables) {
+      const char* before = std::getenv(name.c_str());
+      before_.emplace(name, before != nullptr ? std::optional<std::string>(before) : std::nullopt);
+      ::setenv(name.c_str(), value.c_str(), 1);
+    }
+  }
+  ~FullDisk() {
+    make_room();
+    for (const auto& [name, value] : before_)
+      value ? ::setenv(name.c_str(), value->c_str(), 1) : ::unsetenv(name.c_str());
+  }
+  FullDisk(const FullDisk&) = delete;
+  FullDisk& operator=(const FullDisk&) = delete;
+  // Files can still be made and renamed, but nothing be written.
+  void fill() const { failing_.begin(ENOSPC, "w"); }
+  void make_room() const { failing_.end(); }
+
+ private:
+  test::FailingWrites failing_;
+  std::map<std::string, std::optional<std::string>> before_;
+};
+
+// Closes whatever waits for an answer, as Escape does.
+class Impatience : public QObject {
+ public:
+  Impatience() {
+    connect(&timer_, &QTimer::timeout, this, [this] {
+      if (QWidget* popup = QApplication::activePopupWidget()) popup->close();
+      if (auto* dialog = qobject_cast<QDialog*>(QApplication::activeModalWidget())) {
+        ++closed;
+        dialog->reject();
+      }
+    });
+    timer_.start(10);
+  }
+  int closed = 0;
+
+ private:
+  QTimer timer_;
+};
+
+class WrongUse : public testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    desk_ = std::make_unique<Desk>();
+    ::setenv("PULSE_SERVER", ("unix:" + (desk_->temp() / "nobody").string()).c_str(), 1);
+  }
+  static void TearDownTestSuite() { desk_.reset(); }
+
+  void SetUp() override {
+    ASSERT_TRUE(desk_->stands()) << "Xvfb, of Debian's package xvfb, did not start";
+    QSettings().setValue("tour/seen", true);
+    speak("en");
+    begin();
+  }
+  void TearDown() override {
+    window_.reset();
+    for (const char* program : {"osteon-server", "osteon-haptic", "osteon-audio", "osteon-import"})
+      EXPECT_TRUE(children(program).empty()) << program;
+  }
+
+  void begin() {
+    window_ = std::make_unique<MainWindow>();
+    window_->setGeometry(0, 0, 1280, 900);
+    window_->show();
+    window_->activateWindow();
+    ASSERT_TRUE(QTest::qWaitForWindowActive(window_.get(), 30000));
+    view_ = window_->findChild<BoneView*>("bone");
+  }
+  template <class Condition>
+  [[nodiscard]] bool until(Condition condition, std::chrono::milliseconds patience = kPatience) {
+    const auto deadline = std::chrono::steady_clock::now() + patience;
+    while (!condition()) {
+      if (std::chrono::steady_clock::now() > deadline) return false;
+      QTest::qWait(20);
+    }
+    return true;
+  }
+  [[nodiscard]] QString label(const char* name) const { return window_->findChild<QLabel*>(name)->text(); }
+  // The whole sentence of the lower bar, which shows only its begin if it is long.
+  [[nodiscard]] QString bar() const { return window_->statusBar()->toolTip(); }
+  [[nodiscard]] std::string problem() const { return (label("words") + " / " + bar()).toStdString(); }
+  void open(const fs::path& session = {}) {
+    window_->practise(desk_->bone(), session);
+    ASSERT_TRUE(until([&] { return view_->surface_shown() && label("device") == "Pointer"; })) << problem();
+    view_->look_from(Vec3(0.05, -0.05, 1));
+  }
+  [[nodiscard]] QPoint middle() const { return view_->mapTo(window_.get(), view_->rect().center()); }
+  void hover(const QPoint& at) {
+    QTest::mouseMove(window_->windowHandle(), at + QPoint(1, 0));
+    QTest::mouseMove(window_->windowHandle(), at);
+  }
+  void press(const QPoint& at) { QTest::mousePress(window_->windowHandle(), Qt::LeftButton, {}, at); }
+  void release(const QPoint& at) { QTest::mouseRelease(window_->windowHandle(), Qt::LeftButton, {}, at); }
+  [[nodiscard]] bool cut() const {
+    const SceneUpdater* updater = view_->updater();
+    return updater != nullptr && updater->complete() && updater->surface().any_cut_face();
+  }
+  void drill(const QPoint& at) {
+    window_->findChild<QToolButton*>("drill")->defaultAction()->trigger();
+    ASSERT_TRUE(until([&] {
+      hover(at);
+      return view_->pointer().on_bone();
+    })) << problem();
+    press(at);
+  }
+  [[nodiscard]] bool at_start() const {
+    return window_->findChild<QListWidget*>("examples")->isVisible() &&
+           window_->findChild<QPushButton*>("open")->isEnabled();
+  }
+  // Waits for one sentence on the start page, from which everything can be begun again.
+  [[nodiscard]] std::string refused() {
+    EXPECT_TRUE(until([&] { return at_start() && !label("words").isEmpty(); })) << problem();
+    EXPECT_FALSE(label("words").contains('\n')) << problem();
+    return label("words").toStdString();
+  }
+  [[nodiscard]] fs::path copy_of_bone(const std::string& name) const {
+    const fs::path to = desk_->temp() / name;
+    fs::copy(desk_->bone(), to, fs::copy_options::recursive);
+    return to;
+  }
+  // The newest session.
+  [[nodiscard]] static fs::path session() {
+    const auto recent = recent_entries();
+    return recent.empty() ? fs::path() : recent.front().session;
+  }
+
+  static std::unique_ptr<Desk> desk_;
+  std::unique_ptr<MainWindow> window_;
+  BoneView* view_ = nullptr;
+};
+std::unique_ptr<Desk> WrongUse::desk_;
+
+void make_newer(const fs::path& folder) {
+  std::string text = bytes_of(folder / "case.json");
+  const std::string key = "\"schema_version\": ";
+  text.replace(text.find(key), key.size() + 1, key + "99");
+  put_bytes(folder / "case.json", text);
+}
+
+// Its volumes have no sample in bone.
+void make_empty(const fs::path& folder) {
+  const SparseVolume outside(1.5F), nothing(0.0F);
+  ASSERT_TRUE(save_volumes(folder / "bone.vdb", 0.5,
+                           {{"surface", &outside},
+                            {"density", &nothing},
+                            {"clearance", &outside},
+                            {"bone", &nothing},
+                            {"tissue", &nothing}}));
+}
+
+TEST_F(WrongUse, FilesThatAreNoCaseAreRefused) {
+  const fs::path newer = copy_of_bone("newer"), empty = copy_of_bone("empty");
+  make_newer(newer);
+  make_empty(empty);
+  const auto file = [&](const char* name) { return desk_->temp() / (std::string(name) + ".osteon"); };
+  ASSERT_TRUE(pack_case(desk_->bone(), file("sound"), {}));
+  ASSERT_TRUE(pack_case(newer, file("newer"), {}));
+  ASSERT_TRUE(pack_case(empty, file("empty"), {}));
+  std::string bytes = bytes_of(file("sound"));
+  put_bytes(file("half"), bytes.substr(0, bytes.size() / 2));
+  for (std::size_t at = 0; (at = bytes.find("case.json")) != std::string::npos;) bytes.replace(at, 9, "../e.json");
+  put_bytes(file("climbs"), bytes);
+  put_bytes(file("text"), "A letter.\n");
+  put_bytes(file("nothing"), "");
+  const std::map<std::string, std::string> why{
+      {"newer", "schema_version is 99"},      {"empty", "is empty: no sample lies in bone"},
+      {"half", "is not a sound zip archive"}, {"climbs", "has an entry that"},
+      {"text", "is not a zip archive"},       {"nothing", "zip archive"}};
+  fs::create_directories(cases_folder());
+  const auto cases = names_in(cases_folder()), outside = names_in(data_folder());
+  const std::size_t sessions = recent_entries().size();
+  for (const auto& [name, reason] : why) {
+    window_->open_case_file(file(name.c_str()));
+    const std::string said = refused();
+    EXPECT_NE(said.find(name + ".osteon"), std::string::npos) << said;
+    EXPECT_NE(said.find(reason), std::string::npos) << said;
+  }
+  EXPECT_EQ(names_in(cases_folder()), cases);
+  EXPECT_EQ(names_in(data_folder()), outside);
+  EXPECT_FALSE(fs::exists(desk_->temp() / "e.json"));
+  // Their folders are no better.
+  for (const auto& [folder, reason] : {std::pair(newer, "schema_version is 99"), std::pair(empty, "is empty")}) {
+    window_->practise(folder);
+    const std::string said = refused();
+    EXPECT_NE(said.find(reason), std::string::npos) << said;
+  }
+  EXPECT_EQ(recent_entries().size(), sessions);
+}
+
+TEST_F(WrongUse, AFullDiskLeavesTheOldFileAndTheWork) {
+  const fs::path folder = desk_->temp() / "disk", file = folder / "My block.osteon", picture = folder / "picture.png";
+  fs::create_directory(folder);
+  put_bytes(file, "what was there before");
+  const FullDisk disk(folder.string() + "/", desk_->temp() / "control");
+  open();
+  disk.fill();
+  window_->save_case_file(QString::fromStdString(file.string()));
+  ASSERT_TRUE(until([&] { return bar().contains("make room on the disk"); })) << problem();
+  EXPECT_FALSE(bar().contains('\n'));
+  EXPECT_EQ(bytes_of(file), "what was there before");
+  EXPECT_EQ(names_in(folder), std::set<std::string>{"My block.osteon"});
+  EXPECT_TRUE(view_->surface_shown());
+  disk.make_room();
+  window_->save_case_file(QString::fromStdString(file.string()));
+  ASSERT_TRUE(until([&] { return bar().startsWith("Saved"); })) << problem();
+  EXPECT_GT(fs::file_size(file), 10000u);
+
+  put_bytes(picture, "what was there before");
+  {
+    const SmallFiles small(1000);
+    EXPECT_FALSE(view_->scene().save_png(picture));
+  }
+  EXPECT_EQ(bytes_of(picture), "what was there before");
+  EXPECT_EQ(names_in(folder), (std::set<std::string>{"My block.osteon", "picture.png"}));
+}
+
+TEST_F(WrongUse, ADiskThatFillsUpEndsTheSessionAndKeepsTheCut) {
+  const fs::path folder = desk_->temp() / "session";
+  const FullDisk disk((folder / "session.journal").string(), desk_->temp() / "control");
+  open(folder);
+  drill(middle());
+  ASSERT_TRUE(until([&] { return cut(); })) << problem();
+  QTest::qWait(300);
+  disk.fill();
+  const std::string said = refused();
+  release(middle());
+  EXPECT_NE(said.find("make room on the disk"), std::string::npos) << said;
+  disk.make_room();
+  open(folder);
+  EXPECT_TRUE(cut());
+}
+
+TEST_F(WrongUse, ADoubleClickOpensASessionOnce) {
+  open();
+  window_->close();
+  begin();
+  auto* list = window_->findChild<QListWidget*>("recent");
+  ASSERT_GE(list->count(), 1);
+  const QPoint at = list->visualItemRect(list->item(0)).center();
+  QTest::mouseDClick(list->viewport(), Qt::LeftButton, {}, at);
+  ASSERT_TRUE(until([&] { return view_->surface_shown(); })) << problem();
+  EXPECT_EQ(children("osteon-server").size(), 1u);
+}
+
+TEST_F(WrongUse, DoubleClicksOnEverythingDoNoHarm) {
+  Impatience impatience;
+  // What one of them opens may be gone when the next one's turn comes.
+  const auto all_buttons_twice = [&] {
+    std::vector<QPointer<QAbstractButton>> buttons;
+    for (auto* button : window_->findChildren<QAbstractButton*>()) buttons.emplace_back(button);
+    for (const auto& button : buttons)
+      if (button && button->isVisible() && button->isEnabled()) QTest::mouseDClick(button, Qt::LeftButton);
+  };
+  // On the start page, with what opens a dialog.
+  all_buttons_twice();
+  EXPECT_GE(impatience.closed, 3);
+  EXPECT_TRUE(at_start());
+  const auto all_twice = [&](const std::set<QString>& but) {
+    int count = 0;
+    std::vector<QPointer<QAction>> actions;
+    for (auto* action : window_->findChildren<QAction*>())
+      if (action->menu() == nullptr && !but.contains(action->objectName())) actions.emplace_back(action);
+    for (const auto& action : actions)
+      for (int time = 0; time < 2; ++time)
+        if (action && action->isEnabled() && action->isVisible()) {
+          action->trigger();
+          ++count;
+        }
+    return count;
+  };
+  const std::set<QString> ends{"quit", "start_page"};
+  all_twice(ends);
+  open();
+  EXPECT_GT(all_twice(ends), 100);
+  all_buttons_twice();
+  for (auto* dialog : window_->findChildren<QDialog*>()) dialog->close();
+  QTest::qWait(50);
+  EXPECT_EQ(children("osteon-server").size(), 1u);
+  // The window works on.
+  window_->activateWindow();
+  for (auto* panel : window_->findChildren<QDockWidget*>()) panel->hide();
+  drill(middle());
+  EXPECT_TRUE(until([&] { return cut(); })) << problem();
+  release(middle());
+  window_->findChild<QAction*>("start_page")->trigger();
+  window_->findChild<QAction*>("start_page")->trigger();
+  EXPECT_TRUE(at_start());
+  window_->findChild<QAction*>("quit")->trigger();
+  window_->findChild<QAction*>("quit")->trigger();
+  EXPECT_FALSE(window_->isVisible());
+  QSettings().remove("window");
+}
+
+TEST_F(WrongUse, ADoubleClickPlacesOnePin) {
+  open();
+  window_->findChild<QToolButton*>("pin")->defaultAction()->trigger();
+  for (int click = 0; click < 2; ++click) {
+    press(middle());
+    release(middle());
+  }
+  ASSERT_TRUE(until([&] { return view_->updater()->items().size() == 1; })) << problem();
+  QTest::qWait(300);
+  EXPECT_EQ(view_->updater()->items().size(), 1u);
+}
+
+TEST_F(WrongUse, AWindowThatIsClosedWhileItSavesFinishesTheFile) {
+  const fs::path file = desk_->temp() / "closing.osteon";
+  open();
+  window_->save_case_file(QString::fromStdString(file.string()));
+  window_->close();
+  EXPECT_TRUE(window_->isVisible());
+  EXPECT_TRUE(bar().startsWith("The window closes when")) << problem();
+  EXPECT_TRUE(until([&] { return !window_->isVisible(); })) << problem();
+  const std::string saved = bytes_of(file);
+  EXPECT_GT(saved.size(), 10000u);
+  // Whoever closes it once more gives up the new file, and keeps the old one.
+  put_bytes(file, "what was there before");
+  begin();
+  open();
+  window_->save_case_file(QString::fromStdString(file.string()));
+  window_->close();
+  window_->close();
+  EXPECT_FALSE(window_->isVisible());
+  EXPECT_TRUE(children("osteon-import").empty());
+  EXPECT_TRUE(bytes_of(file) == "what was there before" || bytes_of(file) == saved);
+  for (const std::string& name : names_in(file.parent_path())) EXPECT_EQ(name.find(".partial"), std::string::npos);
+}
+
+// The other window is a program of its own.
+TEST_F(WrongUse, TwoWindowsShareSettingsAndFilesAndNoSession) {
+  open();
+  const fs::path mine = session();
+  test::Process other(test::program("osteon"), {desk_->bone().string()});
+  ASSERT_TRUE(until([&] { return session() != mine; })) << other.err();
+  const fs::path theirs = session();
+  EXPECT_EQ(recent_entries().at(1).session, mine) << "it is not lost";
+
+  window_->practise(desk_->bone(), theirs);
+  EXPECT_EQ(refused(), "Another window has this session open. Close it there first.");
+  EXPECT_TRUE(other.running());
+  EXPECT_EQ(children_of(std::to_string(other.pid()), "osteon-server").size(), 1u);
+
+  // Both save to the same file at the same time: one of both is there as a whole.
+  open(mine);
+  const fs::path file = desk_->temp() / "both.osteon";
+  test::Process also(test::program("osteon-import"), {"pack", "--replace", desk_->bone().string(), file.string()});
+  window_->save_case_file(QString::fromStdString(file.string()));
+  EXPECT_TRUE(until([&] { return bar().startsWith("Saved "); })) << problem();
+  EXPECT_EQ(also.wait(60s), 0) << also.err();
+  const auto read =
+      test::run(test::program("osteon-import"), {"unpack", file.string(), "--out", (desk_->temp() / "both").string()});
+  EXPECT_EQ(read.exit_code, 0) << read.err;
+
+  // Killed, it leaves no program behind, and its session can be gone on with here.
+  std::vector<pid_t> orphans;
+  for (const char* program : {"osteon-server", "osteon-haptic", "osteon-audio"})
+    for (const pid_t pid : children_of(std::to_string(other.pid()), program)) orphans.push_back(pid);
+  EXPECT_GE(orphans.size(), 2u);
+  const fs::path socket = fs::path(std::getenv("XDG_RUNTIME_DIR")) / ("osteon-pointer-" + std::to_string(other.pid()));
+  EXPECT_TRUE(fs::exists(socket));
+  other.signal(SIGKILL);
+  EXPECT_TRUE(other.wait(10s).has_value());
+  EXPECT_TRUE(until([&] { return std::ranges::none_of(orphans, lives); }));
+  open(theirs);
+  window_.reset();
+  EXPECT_FALSE(fs::exists(socket)) << "the last window clears up";
+}
+
+TEST_F(WrongUse, NoWindowForgetsTheSessionsOfOthers) {
+  QSettings().remove("recent");
+  const fs::path bone = desk_->bone();
+  const auto keep = [&](int from) {
+    for (int i = from; i < from + 6; ++i)
+      remember({{}, bone, "/session-" + std::to_string(i), "My block.osteon", QDateTime::currentDateTime()});
+  };
+  std::thread one([&] { keep(0); }), two([&] { keep(6); });
+  one.join();
+  two.join();
+  std::set<std::string> sessions;
+  for (const RecentEntry& entry : recent_entries()) sessions.insert(entry.session.string());
+  EXPECT_EQ(sessions.size(), 12u);
+
+  // A case on a disk that is not there today.
+  const fs::path away = copy_of_bone("away"), elsewhere = desk_->temp() / "elsewhere";
+  remember({{}, away, "/session-away", {}, QDateTime::currentDateTime()});
+  fs::rename(away, elsewhere);
+  EXPECT_NE(recent_entries().front().session, "/session-away");
+  remember({{}, desk_->bone(), "/session-0", {}, QDateTime::currentDateTime()});
+  fs::rename(elsewhere, away);
+  EXPECT_EQ(recent_entries().at(1).session, "/session-away");
+  QSettings().remove("recent");
+}
+
+TEST_F(WrongUse, SessionsAreNamedInTheLanguageOfTheWindow) {
+  QSettings().remove("recent");
+  const ExampleBone pelvis = example_bones().back();
+  fs::create_directories(cases_folder());
+  fs::copy(desk_->bone(), example_folder(pelvis), fs::copy_options::recursive);
+  const QDateTime when(QDate(2026, 3, 5), QTime(14, 7));
+  remember({pelvis.title, example_folder(pelvis), "/a", {}, when});
+  EXPECT_TRUE(recent_entries().front().title.startsWith("Pelvis, a phantom, "))
+      << recent_entries().front().title.toStdString();
+  speak("de");
+  const QString german = recent_entries().front().title;
+  EXPECT_TRUE(german.startsWith("Becken, Phantom, ")) << german.toStdString();
+  EXPECT_TRUE(german.contains("05.03.")) << german.toStdString();
+  // So is what the audio client says, which speaks English.
+  const QString sound =
+      sound_trouble("no sound server answers (it names no device); start PulseAudio, or use --output none");
+  EXPECT_TRUE(sound.startsWith("Kein Tonserver antwortet")) << sound.toStdString();
+  EXPECT_EQ(sound_trouble("something new"), "something new");
+  speak("en");
+  // An older window has kept the title.
+  QSettings settings;
+  settings.beginWriteArray("recent", 1);
+  settings.setArrayIndex(0);
+  settings.setValue("title", "Knie, gestern");
+  settings.setValue("bone", QString::fromStdString(example_folder(pelvis).string()));
+  settings.setValue("session", "/old");
+  settings.remove("opened");
+  settings.endArray();
+  EXPECT_EQ(recent_entries().front().title, "Knie, gestern");
+  settings.remove("recent");
+  fs::remove_all(example_folder(pelvis));
+}
+
+TEST_F(WrongUse, WhatWasLeftBehindGoesWhenTheOnlyWindowCloses) {
+  const std::string needed(64, 'a'), unneeded(64, 'b'), dead = std::to_string(dead_pid()),
+                                                        alive = std::to_string(::getpid());
+  const fs::path cases = cases_folder(), sockets = std::getenv("XDG_RUNTIME_DIR");
+  const std::set<std::string> stay{
+      needed, "my-import", "femur.partial-" + alive, "unpack-" + alive + ".log", "notes.log", std::string(63, 'c')},
+      go{unneeded, "femur.partial-" + dead, "unpack-" + dead + ".log"};
+  fs::create_directories(cases);
+  const auto put = [&](const std::string& name) {
+    if (name.ends_with(".log")) return put_bytes(cases / name, "words");
+    fs::create_directories(cases / name);
+    fs::copy_file(desk_->bone() / "case.json", cases / name / "case.json");
+  };
+  for (const auto& names : {stay, go}) std::ranges::for_each(names, put);
+  const fs::path socket = sockets / ("osteon-sound-" + dead);
+  sockaddr_un address{};
+  address.sun_family = AF_UNIX;
+  socket.string().copy(address.sun_path, sizeof address.sun_path - 1);
+  const int fd = ::socket(AF_UNIX, SOCK_SEQPACKET, 0);
+  ASSERT_EQ(::bind(fd, reinterpret_cast<const sockaddr*>(&address), sizeof address), 0);
+  ::close(fd);
+
+  QSettings().remove("recent");
+  auto all = stay;
+  all.insert(go.begin(), go.end());
+  { MainWindow second; }
+  EXPECT_EQ(names_in(cases), all) << "another window may need it";
+  remember({{}, cases / needed, "/session", "a.osteon", QDateTime::currentDateTime()});
+  window_.reset();
+  EXPECT_EQ(names_in(cases), stay);
+  EXPECT_FALSE(fs::exists(socket));
+  // Where the settings are lost, the sessions are not.
+  QSettings().remove("recent");
+  begin();
+  EXPECT_EQ(names_in(cases), stay);
+  // The first window does the same.
+  window_.reset();
+  remember({{}, desk_->bone(), "/session", {}, QDateTime::currentDateTime()});
+  begin();
+  EXPECT_FALSE(fs::exists(cases / needed));
+  QSettings().remove("recent");
+  for (const std::string& name : stay) fs::remove_all(cases / name);
+}
+
+TEST_F(WrongUse, AKilledAudioClientComesBackAndIsGivenUpInOneSentence) {
+  open();
+  pid_t killed = 0;
+  const auto kill_next = [&] {
+    std::vector<pid_t> now;
+    EXPECT_TRUE(until([&] {
+      now = children("osteon-audio");
+      return now.size() == 1 && now[0] != killed;
+    })) << problem();
+    killed = now.empty() ? 0 : now[0];
+    ASSERT_GT(killed, 0);
+    EXPECT_EQ(::kill(killed, SIGKILL), 0);
+  };
+  kill_next();
+  EXPECT_TRUE(until([&] { return bar() == "The audio client ended and starts again."; })) << problem();
+  kill_next();
+  kill_next();
+  EXPECT_TRUE(until([&] { return bar() == "There is no sound: osteon-audio was ended by force or crashed."; }))
+      << problem();
+  // Bone can be cut without sound, and whoever switches the sound on again gets it.
+  drill(middle());
+  EXPECT_TRUE(until([&] { return cut(); })) << problem();
+  release(middle());
+  for (int time = 0; time < 2; ++time) window_->findChild<QAction*>("sound")->trigger();
+  EXPECT_TRUE(until([&] { return children("osteon-audio").size() == 1; })) << problem();
+}
+
+TEST_F(WrongUse, AServerThatIsKilledAgainAndAgainEndsTheRoomInOneSentence) {
+  open();
+  pid_t killed = 0;
+  for (int time = 0; time < 3; ++time) {
+    std::vector<pid_t> now;
+    // It must have said where it listens, or its end is a start that failed.
+    ASSERT_TRUE(until([&] {
+      now = children("osteon-server");
+      return now.size() == 1 && now[0] != killed && fs::exists(session() / "logs" / "address");
+    })) << problem();
+    ASSERT_EQ(::kill(killed = now[0], SIGKILL), 0);
+  }
+  EXPECT_EQ(refused(), "osteon-server was ended by force or crashed.");
+  const fs::path last = session();
+  open(last);
+}
+
+TEST_F(WrongUse, ARoomThatOthersRunGoesAndComesBack) {
+  // In a room to practise in. It ends, because the window is in one room only.
+  open();
+  test::Process server(test::program("osteon-server"), {"--case", desk_->bone().string(), "--plain", "--listen",
+                                                        "127.0.0.1:0", "--address-file", desk_->temp() / "address"});
+  ASSERT_TRUE(until([&] { return bytes_of(desk_->temp() / "address").ends_with('\n'); })) << server.err();
+  const QString address = QString::fromStdString(bytes_of(desk_->temp() / "address")).trimmed();
+  window_->join({address, {}, {}, {}});
+  EXPECT_TRUE(children("osteon-haptic").empty());
+  ASSERT_TRUE(until([&] { return view_->surface_shown(); })) << problem();
+  ASSERT_TRUE(until([&] { return label("connection") == "Connected to " + address; })) << problem();
+
+  server.signal(SIGKILL);
+  EXPECT_TRUE(until([&] { return label("connection") == "Connection lost, trying again"; })) << problem();
+  window_->findChild<QAction*>("undo")->trigger();
+  server = test::Process(test::program("osteon-server"),
+                         {"--case", desk_->bone().string(), "--plain", "--listen", address.toStdString()});
+  EXPECT_TRUE(until([&] { return label("connection") == "Connected to " + address; })) << problem();
+  EXPECT_EQ(server.terminate(), 0);
+
+  // Nobody is there. The page says so, and everything else can be begun meanwhile and afterwards.
+  window_->join({address, {}, {}, {}});
+  EXPECT_EQ(label("words"), "Joining the room at " + address);
+  EXPECT_FALSE(at_start());
+  window_->findChild<QPushButton*>("cancel")->click();
+  EXPECT_TRUE(at_start());
+  window_->join({address, {}, {}, {}});
+  EXPECT_TRUE(until([&] { return label("words").contains("nothing listens at"); })) << problem();
+  EXPECT_TRUE(at_start());
+}
+
+}  // namespace
+}  // namespace osteon

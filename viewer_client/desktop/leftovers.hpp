@@ -1,0 +1,30 @@
+// What windows leave behind in the user's folders: unpacked case files that no session needs, and unfinished work of
+// programs that were killed.
+#pragma once
+#include <filesystem>
+#include <memory>
+
+#include "viewer_client/desktop/file_lock.hpp"
+
+namespace osteon {
+
+// Lives as long as a window. The last window to close, and the first to open, clears up.
+class Leftovers {
+ public:
+  // `sockets`: the folder of the windows' sockets.
+  explicit Leftovers(std::filesystem::path sockets);
+  ~Leftovers();
+  Leftovers(const Leftovers&) = delete;
+  Leftovers& operator=(const Leftovers&) = delete;
+
+ private:
+  void clear();
+
+  std::filesystem::path sockets_;
+  std::unique_ptr<FileLock> windows_;  // shared by all windows
+};
+
+// The socket of this program's window for a client; `use` is "pointer" or "sound".
+[[nodiscard]] std::filesystem::path socket_path(const std::filesystem::path& sockets, const char* use);
+
+}  // namespace osteon
