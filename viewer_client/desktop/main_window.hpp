@@ -27,6 +27,7 @@ namespace osteon {
 class BoneView;
 class ClippingPanel;
 class GaugesPanel;
+class PadHand;
 class PropertiesPanel;
 class SoundControl;
 class RiskGauge;
@@ -108,6 +109,7 @@ class MainWindow : public QMainWindow {
   void mark_moment();
   void save_picture();
   void show_help();
+  void follow_pad();
   void refresh_gauges();
   [[nodiscard]] ConnectionState connections();
   void choose_risk_limit();
@@ -144,6 +146,7 @@ class MainWindow : public QMainWindow {
   QTimer gauge_timer_, pointer_timer_, cap_timer_;
   QElapsedTimer clock_, capped_;  // capped_: since the SpaceMouse was asked last
   SpaceMouseWatch space_mouse_{[](const std::string&) {}};
+  std::unique_ptr<PadHand> pad_;  // from the first room on
 };
 
 }  // namespace osteon
