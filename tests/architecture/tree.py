@@ -61,6 +61,7 @@ HEAVY = {
     "Prometheus": (re.compile(r"^prometheus/"), ("server/rpc",)),
     "libusb": (re.compile(r"^libusb"), ("haptic_client/device",)),
     "hidapi": (re.compile(r"^hidapi/"), ("common/input",)),
+    "SDL": (re.compile(r"^(SDL2/)?SDL"), ("viewer_client/pad",)),
     "GDCM": (re.compile(r"^gdcm"), ("common/imaging", "server/import")),
 }
 GENERATED = re.compile(r"\.pb\.h$")

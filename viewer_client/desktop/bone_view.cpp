@@ -153,6 +153,45 @@ void BoneView::follow_cap(const SpaceMouseState& cap, double dt_s) {
   pointer_moved();
 }
 
+void BoneView::follow_pad(const PadOrder& order, double dt_s) {
+  if (!order.used) return;
+  constexpr double kFastest_rad_per_s = 1.2, kShift_per_s = 0.4, kFine = 0.1;
+  const double scale = order.fine ? kFine : 1.0;
+  const Eigen::Vector2d turn_rad = scale * kFastest_rad_per_s * dt_s * order.turn;
+  if (!holding_) {
+    const Eigen::Vector2d shift = scale * kShift_per_s * dt_s * order.slide;
+    if (!turn_rad.isZero()) look(orbited(camera(), turn_rad.x(), turn_rad.y()));
+    if (!shift.isZero()) look(shifted(camera(), shift.x(), shift.y()));
+    return;
+  }
+  if (order.spindle) pointer_.set_spindle(*order.spindle);
+  if (order.toggles_spindle) pointer_.set_spindle(!pointer_.spindle());
+  if (!updater_ || (pointer_.pushing() && !pad_pushes_)) return pointer_moved();  // the mouse or the pen is at work
+  pad_leads_ = true;
+  if (order.fine != pad_fine_) pointer_.set_fine(pad_fine_ = order.fine);
+  if (!turn_rad.isZero()) pointer_.turn(camera(), turn_rad.x(), turn_rad.y());
+  if (!pointer_.on_bone() || !order.slide.isZero()) {
+    // While the hand pushes, it makes fine motions a tenth by itself.
+    const Eigen::Vector2d slide = (pad_pushes_ ? 1.0 : scale) * order.slide;
+    pointer_.slide(camera(), slide.x(), slide.y(), dt_s, updater_->surface());
+    if (!is_drawn(clipping_, pointer_.input().target_mm)) pointer_.leave();
+  }
+  // A push that the window has ended begins again with the next pull of the trigger.
+  if (order.push_begins) pad_pushes_ = begin_pen_push();
+  if (pad_pushes_ && order.push) pointer_.set_push(order.push_n);
+  if (pad_pushes_ && !order.push) lift_pen();
+  pointer_moved();
+}
+
+void BoneView::pad_gone() {
+  if (!pad_leads_) return;
+  if (pad_pushes_) lift_pen();
+  pointer_.set_fine(pad_fine_ = false);
+  if (!underMouse()) pointer_.leave();
+  pad_leads_ = false;
+  pointer_moved();
+}
+
 void BoneView::follow_tool() {
   if (!following_ || !updater_ || updater_->states().empty()) return;
   const Pose& tool = updater_->states().front().pose_bone_tool;
@@ -237,6 +276,7 @@ void BoneView::resizeEvent(QResizeEvent* event) {
 
 void BoneView::mousePressEvent(QMouseEvent* event) {
   last_ = pressed_ = event->pos();
+  if (pad_pushes_) return;  // two hands do not push at one tool
   camera_drag_ = event->button() == Qt::MiddleButton || !holding_;
   if (!holding_ || event->button() != Qt::LeftButton) return;
   point_at(event->pos());
@@ -256,7 +296,8 @@ void BoneView::mouseMoveEvent(QMouseEvent* event) {
       turn_camera(by, event->modifiers());
     return;
   }
-  if (!holding_) return;
+  if (!holding_ || pad_pushes_) return;
+  pad_leads_ = false;
   pointer_.set_fine(event->modifiers() & Qt::ShiftModifier);
   if (event->buttons() & Qt::RightButton) {
     if (event->modifiers() & Qt::ControlModifier)
@@ -270,7 +311,7 @@ void BoneView::mouseMoveEvent(QMouseEvent* event) {
 }
 
 void BoneView::mouseReleaseEvent(QMouseEvent* event) {
-  if (event->button() == Qt::LeftButton && pointer_.pushing()) {
+  if (event->button() == Qt::LeftButton && pointer_.pushing() && !pad_pushes_) {
     lift_pen();
     point_at(event->pos());
     pointer_moved();
@@ -289,7 +330,7 @@ void BoneView::tabletEvent(QTabletEvent* event) {
   event->ignore();
   const QPoint at = event->pos();
   const bool lifted = event->type() == QEvent::TabletRelease && event->button() == Qt::LeftButton && wheel_push_n_;
-  if (!holding_ || camera_drag_) return;
+  if (!holding_ || camera_drag_ || pad_pushes_) return;
   // A button at the pen's side turns the bone. The tip may be lifted while it is still down.
   if (!lifted && (event->buttons() & ~Qt::MouseButtons(Qt::LeftButton)) != Qt::NoButton) return;
   if (event->type() == QEvent::TabletRelease) {
@@ -301,9 +342,7 @@ void BoneView::tabletEvent(QTabletEvent* event) {
     pointer_.set_fine(event->modifiers() & Qt::ShiftModifier);
     point_at(at);
     if (event->type() == QEvent::TabletPress && event->button() == Qt::LeftButton) {
-      if (!pointer_.press()) return;
-      wheel_push_n_ = pointer_.push_n();
-      if (events_.pressed) events_.pressed();
+      if (!begin_pen_push()) return;
     }
     if (wheel_push_n_) pointer_.set_push(kLeastPush_n + event->pressure() * (kMostPush_n - kLeastPush_n));
   }
@@ -311,7 +350,15 @@ void BoneView::tabletEvent(QTabletEvent* event) {
   pointer_moved();
 }
 
+bool BoneView::begin_pen_push() {
+  if (!pointer_.press()) return false;
+  wheel_push_n_ = pointer_.push_n();
+  if (events_.pressed) events_.pressed();
+  return true;
+}
+
 void BoneView::lift_pen() {
+  pad_pushes_ = false;
   pointer_.release();
   if (wheel_push_n_) pointer_.set_push(*wheel_push_n_);
   wheel_push_n_.reset();
@@ -331,6 +378,7 @@ void BoneView::wheelEvent(QWheelEvent* event) {
 
 void BoneView::leaveEvent(QEvent* event) {
   QVTKOpenGLNativeWidget::leaveEvent(event);
+  if (pad_leads_) return;
   pointer_.leave();
   pointer_moved();
 }

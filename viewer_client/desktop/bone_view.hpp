@@ -1,6 +1,7 @@
 // The picture of the bone in the window, and the mouse over it. Without a tool the left button turns the bone, as in an
 // image viewer. With a tool the left button pushes, the right button turns the tool, and the wheel sets the push. The
-// middle button always moves the camera. A pen pushes with its tip, as hard as it is pressed.
+// middle button always moves the camera. A pen pushes with its tip, as hard as it is pressed. A game pad does the same
+// by its sticks and triggers.
 #pragma once
 #include <QCoreApplication>
 #include <QPoint>
@@ -13,6 +14,7 @@
 #include <QVTKOpenGLNativeWidget.h>
 
 #include "common/input/space_mouse_report.hpp"
+#include "viewer_client/pad/pad_control.hpp"
 #include "viewer_client/render/bone_scene.hpp"
 #include "viewer_client/render/scene_updater.hpp"
 #include "viewer_client/scene/tool_pointer.hpp"
@@ -60,6 +62,12 @@ class BoneView : public QVTKOpenGLNativeWidget {
   // The cap of a SpaceMouse was held so for dt_s. Its twist turns the tool in the hand, and its push moves the bone.
   // Without a tool the bone follows both.
   void follow_cap(const SpaceMouseState& cap, double dt_s);
+  // A game pad asked for this for dt_s. Its left stick moves the tool over the bone, its right one turns the tool.
+  // Without a tool they move and turn the bone.
+  void follow_pad(const PadOrder& order, double dt_s);
+  // The pad is away: the mouse says again where the tool is.
+  void pad_gone();
+  [[nodiscard]] bool pad_leads() const { return pad_leads_; }
   [[nodiscard]] bool following() const { return following_; }
   void set_notice(const QString& notice);
   // How the bone is drawn. It holds for the rooms that follow too.
@@ -103,6 +111,7 @@ class BoneView : public QVTKOpenGLNativeWidget {
   void follow_tool();
   void pointer_moved();
   void lift_pen();
+  [[nodiscard]] bool begin_pen_push();
 
   bool whole_ = false;  // nobody has moved the camera since look_whole()
   Events events_;
@@ -116,7 +125,8 @@ class BoneView : public QVTKOpenGLNativeWidget {
   QPoint last_;             // position of the mouse, device pixels
   QPoint pressed_;          // where a button went down
   bool camera_drag_ = false;
-  std::optional<double> wheel_push_n_;  // while a pen pushes: what the wheel has set
+  std::optional<double> wheel_push_n_;  // while a pen or a pad pushes: what the wheel has set
+  bool pad_leads_ = false, pad_pushes_ = false, pad_fine_ = false;
   QString notice_;
   bool marker_ = false, planned_ = false, risks_ = false;
   Clipping clipping_;

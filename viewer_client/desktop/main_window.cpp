@@ -35,6 +35,7 @@
 #include "viewer_client/desktop/clipping_panel.hpp"
 #include "viewer_client/desktop/connection_panel.hpp"
 #include "viewer_client/desktop/gauges_panel.hpp"
+#include "viewer_client/desktop/pad_hand.hpp"
 #include "viewer_client/desktop/properties_panel.hpp"
 #include "viewer_client/desktop/risk_gauge.hpp"
 #include "viewer_client/desktop/sound_control.hpp"
@@ -116,6 +117,7 @@ MainWindow::MainWindow() {
   connect(&cap_timer_, &QTimer::timeout, this, [this] {
     constexpr double kLongest_s = 0.1;
     view_->follow_cap(space_mouse_.cap(), std::min(kLongest_s, 1e-3 * static_cast<double>(capped_.restart())));
+    follow_pad();
   });
   const QSettings settings;
   restoreGeometry(settings.value("window/geometry").toByteArray());
@@ -446,6 +448,9 @@ void MainWindow::show_joined(const WatchedRoom& room) {
   capped_.start();
   cap_timer_.start(kCapPeriod_ms);
   if (pointer_) pointer_timer_.start(kPointerPeriod_ms);
+  if (!pad_)
+    pad_ = std::make_unique<PadHand>(*view_, PadHand::Events{[this](const QString& sentence) { say(sentence); },
+                                                             [this] { findChild<QAction*>("undo")->trigger(); }});
   if (opened_) remember(*opened_);
   view_->setFocus();
   tour_->did(TourStep::open);
@@ -459,6 +464,7 @@ void MainWindow::leave_room() {
   gauge_timer_.stop();
   pointer_timer_.stop();
   cap_timer_.stop();
+  if (pad_) pad_->rest();
   put_tool_down();
   rest_other_hand();
   undo_points_.clear();
@@ -602,6 +608,8 @@ void MainWindow::show_help() {
       {tr("Left button, held"), tr("the hand pushes")},
       {tr("Wheel"), tr("how hard the hand pushes")},
       {tr("Pen"), tr("its tip pushes, as hard as you press it")},
+      {tr("Game pad"), tr("the left stick moves the tool, the right one turns it; the right trigger pushes, the left "
+                          "one or A runs the spindle; the shoulder buttons make motions a tenth; B undoes")},
       {tr("Right button, dragged"), tr("turns the tool; with Ctrl about its own axis")},
       {tr("Shift"), tr("motions at a tenth")},
       {tr("Space"), tr("spindle on or off")},
@@ -614,6 +622,22 @@ void MainWindow::show_help() {
   QString text;
   for (const Line& line : lines) text += QString("<p><b>%1</b>: %2</p>").arg(line.input, line.effect);
   QMessageBox::information(this, tr("How to hold a tool"), text);
+}
+
+void MainWindow::follow_pad() {
+  if (!pad_) return;
+  PadFeel feel;
+  const std::optional<PointerOutput> hand = pointer_ ? pointer_->newest() : std::nullopt;
+  // A force of before says nothing of now: the haptic client may hang, or the room be away.
+  constexpr std::chrono::milliseconds kFresh{60};
+  if (hand && pointer_->silence() < kFresh && room_ && !room_->interrupted()) {
+    const SceneUpdater* updater = view_->updater();
+    feel.force_n = hand->force_hand_n.norm();
+    feel.most_n = hand->device_holds_n;
+    feel.cuts =
+        updater != nullptr && !updater->states().empty() && updater->states().front().phase == CuttingPhase::cutting;
+  }
+  pad_->tick(isActiveWindow(), feel);
 }
 
 void MainWindow::refresh_gauges() {
@@ -637,7 +661,10 @@ void MainWindow::refresh_gauges() {
   const bool any = updater != nullptr && !updater->states().empty();
   risk_->show_tip(any ? std::optional(updater->states().front().pose_bone_tool.position_mm) : std::nullopt);
   if (const QString fault = QString::fromStdString(view_->take_plan_fault()); !fault.isEmpty()) say(fault);
-  if (pointer_) device_->setText(pointer_->connected() ? tr("Pointer") : tr("The pointer's device is away"));
+  if (pointer_)
+    device_->setText(!pointer_->connected() ? tr("The pointer's device is away")
+                     : view_->pad_leads()   ? tr("Game pad")
+                                            : tr("Pointer"));
   if (hand && !hand->trouble.empty()) say(QString::fromStdString(hand->trouble));
 }
 

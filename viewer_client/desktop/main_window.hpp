@@ -28,6 +28,7 @@ namespace osteon {
 class BoneView;
 class ClippingPanel;
 class GaugesPanel;
+class PadHand;
 class PropertiesPanel;
 class SoundControl;
 class RiskGauge;
@@ -114,6 +115,7 @@ class MainWindow : public QMainWindow {
   void mark_moment();
   void save_picture();
   void show_help();
+  void follow_pad();
   void refresh_gauges();
   void show_other_hand(const CuttingState& state);
   [[nodiscard]] ConnectionState connections();
@@ -158,6 +160,7 @@ class MainWindow : public QMainWindow {
   QTimer gauge_timer_, pointer_timer_, cap_timer_;
   QElapsedTimer clock_, capped_;  // capped_: since the SpaceMouse was asked last
   SpaceMouseWatch space_mouse_{[](const std::string&) {}};
+  std::unique_ptr<PadHand> pad_;  // from the first room on
 };
 
 }  // namespace osteon

@@ -20,6 +20,10 @@ class ToolPointer {
   // The pointer moved to this ray. While nobody pushes, the tool rests where the ray meets the surface and points along
   // the mean normal into the bone. While somebody pushes, the tool keeps its direction and moves across it.
   void move(const SightRay& ray, const SurfaceScene& surface);
+  // A stick moved the pointer for dt_s. `right` and `up`: −1 … 1 of the fastest, in the picture's axes. The tool stays
+  // on bone: a gap is crossed, and at an edge it waits. Without a place on bone it begins in the picture's middle, or
+  // next to it. While somebody pushes, the tool moves across its axis, no faster than a hand can follow.
+  void slide(const CameraView& view, double right, double up, double dt_s, const SurfaceScene& surface);
   // The pointer left the picture.
   void leave();
   // The button went down. False: there is no bone under the pointer.
@@ -53,8 +57,10 @@ class ToolPointer {
   double roll_rad_ = 0;
   Vec3 normal_ = Vec3::UnitZ();
   bool spindle_ = false;
+  Vec3 beside_mm_ = Vec3::Zero();  // from the tool's place on bone to where a stick is, over a gap or beside the bone
 
   void aim();
+  void find_bone(const CameraView& view, const SurfaceScene& surface);
 };
 
 }  // namespace osteon

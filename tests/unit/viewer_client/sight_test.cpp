@@ -4,6 +4,7 @@
 #include <numbers>
 #include <random>
 #include <set>
+#include <utility>
 
 #include "synthetic.hpp"
 #include "viewer_client/scene/camera_view.hpp"
@@ -188,6 +189,74 @@ TEST_F(OnBall, TurningTiltsTheToolAndRollingKeepsItsAxis) {
   pointer_.take("burr-round-5");
   over(Vec3(0, -10, 0));
   EXPECT_GT(axis().dot(straight), 0.9999);
+}
+
+// A stick's fastest is 0.4 heights of the picture a second, at the tool's distance from the eye.
+TEST_F(OnBall, AStickMovesTheToolAcrossThePicture) {
+  const CameraView view = from_front();
+  for (const auto& [right, up] : {std::pair(1.0, 0.0), std::pair(0.0, -1.0), std::pair(-0.3, 0.4)}) {
+    over(Vec3(0, -10, 0));
+    constexpr double kDt_s = 0.05;
+    pointer_.slide(view, right, up, kDt_s, scene_);
+    const double height_mm = 2.0 * 80.0 * std::tan(0.5 * view.view_angle_rad);
+    // The ball bends away by r² / 2R, which the ray's slope turns into less than 0.01 mm.
+    EXPECT_NEAR(pointer_.input().target_mm.x(), 0.4 * height_mm * kDt_s * right, 0.02);
+    EXPECT_NEAR(pointer_.input().target_mm.z(), 0.4 * height_mm * kDt_s * up, 0.02);
+    EXPECT_TRUE(pointer_.on_bone());
+  }
+}
+
+TEST_F(OnBall, AtAnEdgeTheToolWaitsForTheStick) {
+  const CameraView view = from_front();
+  over(Vec3(0, -10, 0));
+  const auto slide = [&](double right, double time_s) {
+    for (double t = 0.0; t < time_s; t += 0.01) pointer_.slide(view, right, 0.0, 0.01, scene_);
+  };
+  slide(1.0, 5.0);
+  EXPECT_TRUE(pointer_.on_bone());
+  // Where a ray from 100 mm touches a ball of 20 mm: y = −R² / 100 = −4 mm.
+  EXPECT_NEAR(pointer_.input().target_mm.x(), std::sqrt(400.0 - 16.0), 0.3);
+  // The stick went on by 15 mm at most, so 1 s at 20 mm/s brings the tool back onto the ball.
+  slide(-1.0, 1.2);
+  EXPECT_LT(pointer_.input().target_mm.x(), 18.0);
+  EXPECT_GT(pointer_.input().target_mm.x(), 0.0);
+}
+
+TEST(ToolPointer, AStickCrossesAGapAndFindsABoneBesideThePicturesMiddle) {
+  SurfaceScene scene;
+  scene.replace(block({BodyId{0}, 0, {0, 0, 0}}, 1, "left", sphere_mesh(Vec3(-11, 0, 0), 8.0, 0)));
+  scene.replace(block({BodyId{1}, 0, {0, 0, 0}}, 1, "right", sphere_mesh(Vec3(11, 0, 0), 8.0, 0)));
+  ToolPointer pointer;
+  pointer.take("drill-3.2");
+  const CameraView view = from_front();
+  pointer.slide(view, 0.0, 0.0, 0.01, scene);
+  ASSERT_TRUE(pointer.on_bone());
+  const double from_x = pointer.input().target_mm.x(), side = from_x > 0.0 ? -1.0 : 1.0;
+  bool left_bone = false;
+  for (int i = 0; i < 300 && side * pointer.input().target_mm.x() < 5.0; ++i) {
+    pointer.slide(view, side, 0.0, 0.01, scene);
+    left_bone = left_bone || !pointer.on_bone();
+  }
+  EXPECT_GT(side * pointer.input().target_mm.x(), 4.9);
+  EXPECT_FALSE(left_bone);
+  // Where there is no bone at all, there is nothing to find.
+  ToolPointer lost;
+  lost.take("drill-3.2");
+  lost.slide(view, 1.0, 0.0, 0.01, SurfaceScene());
+  EXPECT_FALSE(lost.on_bone());
+}
+
+TEST_F(OnBall, WhileTheHandPushesAStickMovesTheToolAcrossItsAxisAtAHandsSpeed) {
+  CameraView view = from_front();
+  view.eye_mm = Vec3(0, -300, 0);  // 0.4 heights are 60 mm here
+  over(Vec3(0, -10, 0));
+  ASSERT_TRUE(pointer_.press());
+  const Vec3 at = pointer_.input().target_mm, along = axis();
+  pointer_.slide(view, 1.0, 0.0, 0.1, scene_);
+  const Vec3 by = pointer_.input().target_mm - at;
+  EXPECT_NEAR(by.x(), 2.0, 0.01);
+  EXPECT_NEAR(by.dot(along), 0.0, 1e-9);
+  EXPECT_TRUE(pointer_.pushing());
 }
 
 TEST(ToolGroups, EveryBuiltInToolIsInExactlyOneOfEightGroups) {

@@ -1,0 +1,52 @@
+#include "viewer_client/desktop/pad_hand.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include "viewer_client/desktop/bone_view.hpp"
+
+namespace osteon {
+
+namespace {
+
+constexpr qint64 kLookAgain_ms = 1000;
+constexpr double kLongestTick_s = 0.1;  // a window that was busy does not throw the tool far away
+
+}  // namespace
+
+PadHand::PadHand(BoneView& view, Events events) : view_(view), events_(std::move(events)) { ticked_.start(); }
+
+void PadHand::tick(bool may_act, const PadFeel& feel) {
+  const double dt_s = std::min(kLongestTick_s, 1e-3 * static_cast<double>(ticked_.restart()));
+  if (!pad_.is_open()) {
+    if (looked_.isValid() && looked_.elapsed() < kLookAgain_ms) return;
+    looked_.start();
+  }
+  const GamePad::Change change = pad_.poll();
+  const QString name = pad_.name().empty() ? tr("The game pad") : QString::fromStdString(pad_.name());
+  if (change == GamePad::Change::opened) {
+    control_ = PadControl();
+    events_.said(tr("%1: choose a tool. The left stick moves it, the right trigger pushes.").arg(name));
+  } else if (change == GamePad::Change::lost) {
+    let_go();
+    events_.said(tr("%1 was unplugged. It holds the tool no more.").arg(name));
+  }
+  if (!pad_.is_open()) return;
+  if (!may_act) return rest();
+  const PadOrder order = control_.step(pad_.state());
+  view_.follow_pad(order, dt_s);
+  if (order.undoes) events_.undo();
+  pad_.rumble(rumble_of(feel.force_n, feel.most_n, feel.cuts));
+}
+
+void PadHand::rest() {
+  let_go();
+  pad_.rumble({});
+}
+
+void PadHand::let_go() {
+  view_.follow_pad(control_.let_go(), 0.0);
+  view_.pad_gone();
+}
+
+}  // namespace osteon

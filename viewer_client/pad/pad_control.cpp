@@ -1,0 +1,61 @@
+#include "viewer_client/pad/pad_control.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "common/input/pointer_link.hpp"
+
+namespace osteon {
+
+Eigen::Vector2d shaped_stick(const Eigen::Vector2d& stick, double rest) noexcept {
+  const double out = stick.norm();
+  if (!(out > rest)) return Eigen::Vector2d::Zero();
+  const double way = (std::min(out, 1.0) - rest) / (1.0 - rest);
+  return way * way / out * stick;
+}
+
+void PadControl::Held::take(bool down, bool up) noexcept {
+  if (up) held = false, may = true;
+  if (down && may) held = true;
+}
+
+PadOrder PadControl::step(const PadState& state) noexcept {
+  const bool pushed = push_.held, ran = spindle_.held, a = a_.held, b = b_.held;
+  push_.take(state.right_trigger > kTriggerPulled, state.right_trigger < kTriggerRest);
+  spindle_.take(state.left_trigger > kTriggerPulled, state.left_trigger < kTriggerRest);
+  a_.take(state.a, !state.a);
+  b_.take(state.b, !state.b);
+  PadOrder order;
+  order.slide = shaped_stick(state.left, kStickRest);
+  order.turn = shaped_stick(state.right, kStickRest);
+  order.push = push_.held;
+  order.push_begins = push_.held && !pushed;
+  if (order.push) {
+    const double pulled = std::clamp((state.right_trigger - kTriggerRest) / (1.0 - kTriggerRest), 0.0, 1.0);
+    order.push_n = kLeastPush_n + pulled * (kMostPush_n - kLeastPush_n);
+  }
+  order.fine = state.shoulder;
+  if (spindle_.held != ran) order.spindle = spindle_.held;
+  order.toggles_spindle = a_.held && !a;
+  order.undoes = b_.held && !b;
+  const bool used = !order.slide.isZero() || !order.turn.isZero() || order.push || spindle_.held || a_.held || b_.held;
+  order.used = used || used_;
+  used_ = used;
+  return order;
+}
+
+PadOrder PadControl::let_go() noexcept {
+  PadOrder order;
+  if (spindle_.held) order.spindle = false;
+  order.used = used_;
+  *this = PadControl();
+  return order;
+}
+
+PadRumble rumble_of(double force_n, double most_n, bool cuts) noexcept {
+  if (!(force_n >= kFelt_n) || !(most_n > 0.0)) return {};
+  const double low = std::sqrt(std::min(1.0, force_n / most_n));
+  return {low, cuts ? 0.5 * low : 0.0};
+}
+
+}  // namespace osteon
