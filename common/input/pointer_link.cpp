@@ -30,7 +30,8 @@ std::string encode(const PointerInput& input) {
               {"fine", input.fine},
               {"spindle", input.spindle},
               {"spindle_rpm", input.spindle_rpm},
-              {"tool", shortened(input.tool)}}
+              {"tool", shortened(input.tool)},
+              {"source", name_of(input.source)}}
       .dump(-1, ' ', false, json::error_handler_t::replace);
 }
 
@@ -64,6 +65,7 @@ Result<PointerInput> read_pointer_input(std::string_view text) {
   input.spindle = fields->number("spindle", 0.0, 1.0);
   input.spindle_rpm = fields->number("spindle_rpm", 0.0, kMostRpm);
   input.tool = fields->text("tool");
+  input.source = static_cast<PointerSource>(fields->choice("source", kPointerSources));
   if (const Result<void> read = fields->outcome(); !read) return tl::unexpected(read.error());
   return input;
 }

@@ -1,6 +1,9 @@
 // A local socket between a window and the haptic client of the same user: where the pointer is, and what the tool does.
 // Each message is one packet of JSON text. The newest message counts, so neither side ever waits.
 #pragma once
+#include <array>
+#include <cstddef>
+#include <cstdint>
 #include <string>
 #include <string_view>
 
@@ -11,6 +14,13 @@
 namespace osteon {
 
 inline constexpr double kLeastPush_n = 1.0, kMostPush_n = 40.0;
+
+// What leads the pointer.
+enum class PointerSource : std::uint8_t { mouse, pen, game_pad };
+inline constexpr std::array<std::string_view, 3> kPointerSources{"mouse", "pen", "game pad"};
+[[nodiscard]] constexpr std::string_view name_of(PointerSource source) {
+  return kPointerSources[static_cast<std::size_t>(source)];
+}
 
 // From the window. Frame: bone.
 struct PointerInput {
@@ -23,6 +33,7 @@ struct PointerInput {
   double spindle = 0.0;      // share of the spindle's speed, 0 to 1
   double spindle_rpm = 0.0;  // its full speed; 0: the tool's own
   std::string tool{};        // that the hand is to hold; empty: no change
+  PointerSource source = PointerSource::mouse;
   friend bool operator==(const PointerInput&, const PointerInput&) = default;
 };
 

@@ -168,6 +168,7 @@ void BoneView::follow_pad(const PadOrder& order, double dt_s) {
   if (order.toggles_spindle) pointer_.set_spindle(!pointer_.spindle());
   if (!updater_ || (pointer_.pushing() && !pad_pushes_)) return pointer_moved();  // the mouse or the pen is at work
   pad_leads_ = true;
+  pointer_.set_source(PointerSource::game_pad);
   if (order.fine != pad_fine_) pointer_.set_fine(pad_fine_ = order.fine);
   if (!turn_rad.isZero()) pointer_.turn(camera(), turn_rad.x(), turn_rad.y());
   if (!pointer_.on_bone() || !order.slide.isZero()) {
@@ -279,6 +280,7 @@ void BoneView::mousePressEvent(QMouseEvent* event) {
   if (pad_pushes_) return;  // two hands do not push at one tool
   camera_drag_ = event->button() == Qt::MiddleButton || !holding_;
   if (!holding_ || event->button() != Qt::LeftButton) return;
+  pointer_.set_source(PointerSource::mouse);
   point_at(event->pos());
   // Beside the bone there is nothing to push at. Then the button turns the bone.
   camera_drag_ = !pointer_.press();
@@ -298,6 +300,7 @@ void BoneView::mouseMoveEvent(QMouseEvent* event) {
   }
   if (!holding_ || pad_pushes_) return;
   pad_leads_ = false;
+  pointer_.set_source(PointerSource::mouse);
   pointer_.set_fine(event->modifiers() & Qt::ShiftModifier);
   if (event->buttons() & Qt::RightButton) {
     if (event->modifiers() & Qt::ControlModifier)
@@ -339,6 +342,7 @@ void BoneView::tabletEvent(QTabletEvent* event) {
     point_at(at);
   } else {
     last_ = at;
+    pointer_.set_source(PointerSource::pen);
     pointer_.set_fine(event->modifiers() & Qt::ShiftModifier);
     point_at(at);
     if (event->type() == QEvent::TabletPress && event->button() == Qt::LeftButton) {

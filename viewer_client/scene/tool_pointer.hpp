@@ -38,6 +38,7 @@ class ToolPointer {
   void set_push(double newtons);
   void set_fine(bool fine) { input_.fine = fine; }
   void set_spindle(bool on) { spindle_ = on; }
+  void set_source(PointerSource source) { input_.source = source; }
 
   [[nodiscard]] bool pushing() const { return input_.push; }
   [[nodiscard]] bool on_bone() const { return input_.on_bone; }

@@ -35,6 +35,7 @@ PointerInput an_input() {
   input.spindle = 0.75;
   input.spindle_rpm = 1200.0;
   input.tool = "drill-3.2";
+  input.source = PointerSource::game_pad;
   return input;
 }
 
@@ -154,7 +155,8 @@ TEST(PointerMessage, EachFieldOfTheWindowIsChecked) {
                        {"push_n", no_number(kLeastPush_n, kMostPush_n)},
                        {"spindle", no_number(0.0, 1.0)},
                        {"spindle_rpm", no_number(0.0, 2e5)},
-                       {"tool", kNoText}},
+                       {"tool", kNoText},
+                       {"source", {nullptr, 2, true, "", "Mouse", "game pad ", std::string(513, 'x')}}},
                       input_refusal);
 }
 
