@@ -27,7 +27,7 @@ class PadTest : public testing::Test {
  protected:
   void SetUp() override {
     ASSERT_TRUE(desk_.stands()) << "Xvfb, of Debian's package xvfb, did not start";
-    ::setenv("PULSE_SERVER", ("unix:" + (desk_.temp().path() / "nobody").string()).c_str(), 1);
+    ::setenv("PULSE_SERVER", ("unix:" + (desk_.temp() / "nobody").string()).c_str(), 1);
     window_ = std::make_unique<MainWindow>();
     window_->setGeometry(0, 0, 1280, 900);
     window_->show();
@@ -78,11 +78,14 @@ TEST_F(PadTest, APadDrillsRumblesUndoesAndLetsGoWhenItIsUnplugged) {
   ToolPointer& pointer = view_->pointer();
   EXPECT_FALSE(pointer.on_bone());
 
-  // The left stick brings the tool onto the bone, and moves it to the picture's right: the block's +x from above.
+  // The left stick brings the tool onto the bone, and moves it to the picture's right: seen from above, with the face
+  // upward, that is the patient's right, -x.
   PadState hand;
   hand.left.x() = 1.0;
   plug_.hold(hand);
-  ASSERT_TRUE(until([&] { return pointer.on_bone() && pointer.input().target_mm.x() > 3.0; })) << said();
+  ASSERT_TRUE(until([&] { return pointer.on_bone(); })) << said();
+  const double from_x = pointer.input().target_mm.x();
+  ASSERT_TRUE(until([&] { return pointer.input().target_mm.x() < from_x - 3.0; })) << said();
   plug_.hold({});
   EXPECT_TRUE(until([&] { return label("device") == "Game pad"; }));
   EXPECT_EQ(pointer.input().source, PointerSource::game_pad);

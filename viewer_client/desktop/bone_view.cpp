@@ -170,8 +170,9 @@ void BoneView::follow_pad(const PadOrder& order, double dt_s) {
   pad_leads_ = true;
   pointer_.set_source(PointerSource::game_pad);
   if (order.fine != pad_fine_) pointer_.set_fine(pad_fine_ = order.fine);
-  if (!turn_rad.isZero()) pointer_.turn(camera(), turn_rad.x(), turn_rad.y());
-  if (!pointer_.on_bone() || !order.slide.isZero()) {
+  // A hand that pushes keeps its axis.
+  if (!pad_pushes_ && !turn_rad.isZero()) pointer_.turn(camera(), turn_rad.x(), turn_rad.y());
+  if (!order.slide.isZero() || (order.push_begins && !pointer_.on_bone())) {
     // While the hand pushes, it makes fine motions a tenth by itself.
     const Eigen::Vector2d slide = (pad_pushes_ ? 1.0 : scale) * order.slide;
     pointer_.slide(camera(), slide.x(), slide.y(), dt_s, updater_->surface());
@@ -277,7 +278,7 @@ void BoneView::resizeEvent(QResizeEvent* event) {
 
 void BoneView::mousePressEvent(QMouseEvent* event) {
   last_ = pressed_ = event->pos();
-  if (pad_pushes_) return;  // two hands do not push at one tool
+  if (pad_pushes_ && event->button() == Qt::LeftButton) return;  // two hands do not push at one tool
   camera_drag_ = event->button() == Qt::MiddleButton || !holding_;
   if (!holding_ || event->button() != Qt::LeftButton) return;
   pointer_.set_source(PointerSource::mouse);
