@@ -1,5 +1,6 @@
 #include "common/input/link_message.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <utility>
@@ -66,6 +67,12 @@ std::string LinkMessage::text(const char* name) {
   const auto& value = field->get_ref<const std::string&>();
   if (value.size() > kMostLinkText) return wrong(name), std::string();
   return value;
+}
+
+std::size_t LinkMessage::choice(const char* name, std::span<const std::string_view> choices) {
+  const auto found = std::find(choices.begin(), choices.end(), text(name));
+  if (found == choices.end()) return wrong(name), std::size_t{0};
+  return static_cast<std::size_t>(found - choices.begin());
 }
 
 void LinkMessage::array(const char* name, double most, double* values, std::size_t count) {

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <memory>
 #include <nlohmann/json_fwd.hpp>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -14,7 +15,7 @@
 
 namespace osteon {
 
-inline constexpr int kLinkVersion = 2;
+inline constexpr int kLinkVersion = 3;
 // Bytes. Two texts of control characters, of six bytes each in JSON, a wave and all numbers fit into a message.
 inline constexpr std::size_t kMostLinkText = 512;
 
@@ -39,6 +40,8 @@ class LinkMessage {
   bool yes(const char* name);
   bool yes_if_given(const char* name);  // of a field that older programs do not send; false without it
   std::string text(const char* name);
+  // The index of a text that is one of these.
+  std::size_t choice(const char* name, std::span<const std::string_view> choices);
   Vec3 vector(const char* name, double most);  // each coordinate from -most to most
   Eigen::Quaterniond rotation(const char* name);
   // At most so many integers, each from -most to most.

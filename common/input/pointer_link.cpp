@@ -32,7 +32,8 @@ std::string encode(const PointerInput& input) {
               {"spindle_rpm", input.spindle_rpm},
               {"tool", shortened(input.tool)},
               {"irrigation", input.irrigation},
-              {"suction", input.suction}}
+              {"suction", input.suction},
+              {"source", name_of(input.source)}}
       .dump(-1, ' ', false, json::error_handler_t::replace);
 }
 
@@ -68,6 +69,7 @@ Result<PointerInput> read_pointer_input(std::string_view text) {
   input.tool = fields->text("tool");
   input.irrigation = fields->yes_if_given("irrigation");
   input.suction = fields->yes_if_given("suction");
+  input.source = static_cast<PointerSource>(fields->choice("source", kPointerSources));
   if (const Result<void> read = fields->outcome(); !read) return tl::unexpected(read.error());
   return input;
 }

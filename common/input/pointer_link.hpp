@@ -1,6 +1,9 @@
 // A local socket between a window and the haptic client of the same user: where the pointer is, and what the tool does.
 // Each message is one packet of JSON text. The newest message counts, so neither side ever waits.
 #pragma once
+#include <array>
+#include <cstddef>
+#include <cstdint>
 #include <string>
 #include <string_view>
 
@@ -11,6 +14,13 @@
 namespace osteon {
 
 inline constexpr double kLeastPush_n = 1.0, kMostPush_n = 40.0;
+
+// What leads the pointer.
+enum class PointerSource : std::uint8_t { mouse, pen, game_pad };
+inline constexpr std::array<std::string_view, 3> kPointerSources{"mouse", "pen", "game pad"};
+[[nodiscard]] constexpr std::string_view name_of(PointerSource source) {
+  return kPointerSources[static_cast<std::size_t>(source)];
+}
 
 // From the window. Frame: bone.
 struct PointerInput {
@@ -25,6 +35,7 @@ struct PointerInput {
   std::string tool{};        // that the hand is to hold; empty: no change
   bool irrigation = false;   // of the other hand; a message without this field: off
   bool suction = false;      // likewise
+  PointerSource source = PointerSource::mouse;
   friend bool operator==(const PointerInput&, const PointerInput&) = default;
 };
 

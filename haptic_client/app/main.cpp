@@ -124,7 +124,7 @@ json haptic_restrictions(const ClientOutcome& outcome) {
             {"guide_most_mm", outcome.telemetry.guide_most_mm}}}};
 }
 
-json summary_of(const ClientOutcome& outcome, const ReadyPlan& plan, std::string_view device, int losses) {
+json summary_of(const ClientOutcome& outcome, const ReadyPlan& plan, const ToolOperator& hand, int losses) {
   const TickStats& ticks = outcome.haptic.ticks;
   json outside = json::object();
   for (const RangeWatch::Use& use : outcome.telemetry.outside_range)
@@ -133,7 +133,8 @@ json summary_of(const ClientOutcome& outcome, const ReadyPlan& plan, std::string
   for (std::size_t i = 0; i < plan.steps.size(); ++i)
     steps.push_back(step_summary(plan.steps[i], plan.tools, outcome.steps[i], outcome.replica.removed_mm3[i]));
   json summary = {
-      {"device", device},
+      {"device", hand.device_name()},
+      {"pointer_sources", hand.pushed()},
       {"device_losses", losses},
       {"device_limits",
        {{"peak_n", outcome.limits.peak_n},
@@ -293,10 +294,9 @@ Result<void> run(Options& options, const StopSignal& stop) {
   const ReadyPlan& plan = (*session)->plan();
   // Both files are written, whatever the result of the other and of the session.
   Result<void> cut_log = write_cut_log(options.cut_log, outcome->replica.cuts);
-  Result<void> summary =
-      options.summary.empty()
-          ? Result<void>()
-          : write_file(options.summary, summary_of(*outcome, plan, hand->device_name(), losses).dump(2) + "\n");
+  Result<void> summary = options.summary.empty()
+                             ? Result<void>()
+                             : write_file(options.summary, summary_of(*outcome, plan, *hand, losses).dump(2) + "\n");
   const auto finished = std::ranges::count_if(outcome->steps, &StepResult::completed);
   const std::string field =
       outcome->replica.field_hash ? to_hex(*outcome->replica.field_hash).substr(0, 12) : "unknown";

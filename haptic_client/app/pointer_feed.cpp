@@ -4,6 +4,8 @@
 #include <chrono>
 #include <utility>
 
+#include "common/runtime/log.hpp"
+
 namespace osteon::haptic {
 namespace {
 
@@ -36,6 +38,13 @@ void PointerFeed::set_tools(std::vector<std::string> names) {
   ready_.store(true, std::memory_order_release);
 }
 
+std::vector<std::string_view> PointerFeed::pushed() const {
+  std::vector<std::string_view> names;
+  for (std::size_t i = 0; i < kPointerSources.size(); ++i)
+    if (pushed_ & (1U << i)) names.push_back(kPointerSources[i]);
+  return names;
+}
+
 void PointerFeed::run() {
   while (!stop_) {
     if (client_->closed()) {
@@ -62,6 +71,11 @@ void PointerFeed::command(const PointerInput& input) {
     const auto found = std::ranges::find(tools_, input.tool);
     trouble_ = found == tools_.end() ? "the tool \"" + input.tool + "\" cannot be held; choose one that cuts" : "";
     if (found != tools_.end()) tool_ = static_cast<int>(found - tools_.begin());
+  }
+  if (input.push && pushes_ != input.source) {
+    pushes_ = input.source;
+    pushed_ |= 1U << static_cast<unsigned>(input.source);
+    log::info("pointer", {{"source", name_of(input.source)}});
   }
   PointerCommand& command = exchange_.commands.writable();
   command = {.number = ++number_,

@@ -4,7 +4,9 @@
 #include <atomic>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
+#include <string_view>
 #include <thread>
 #include <vector>
 
@@ -25,6 +27,8 @@ class PointerFeed {
   // The tools of the session, by their index. Call this before the session's first tick.
   void set_tools(std::vector<std::string> names);
   [[nodiscard]] int losses() const { return losses_; }
+  // What has pushed by now: "mouse", "pen", "game pad".
+  [[nodiscard]] std::vector<std::string_view> pushed() const;
 
  private:
   PointerFeed(std::filesystem::path socket, std::unique_ptr<PointerClient> client, DeviceNotice notice);
@@ -37,10 +41,12 @@ class PointerFeed {
   const DeviceNotice notice_;
   PointerExchange exchange_;
   std::atomic<bool> stop_ = false, ready_ = false;
-  std::vector<std::string> tools_;  // fixed once ready_
-  std::uint64_t number_ = 0;        // thread
-  int tool_ = 0;                    // thread; as commanded last
-  std::string trouble_;             // thread
+  std::vector<std::string> tools_;       // fixed once ready_
+  std::uint64_t number_ = 0;             // thread
+  int tool_ = 0;                         // thread; as commanded last
+  std::string trouble_;                  // thread
+  std::optional<PointerSource> pushes_;  // thread; at the last push
+  std::atomic<unsigned> pushed_ = 0;     // a bit for each source
   std::atomic<int> losses_ = 0;
   std::thread thread_;  // last: it uses the other members
 };

@@ -169,6 +169,10 @@ std::string_view ToolOperator::device_name() const {
   return person_ ? person_->name() : std::string_view(simulated_.name);
 }
 
+std::vector<std::string_view> ToolOperator::pushed() const {
+  return pointer_ ? pointer_->pushed() : std::vector<std::string_view>();
+}
+
 int ToolOperator::losses() const {
   int losses = 0;
   if (pointer_) losses += pointer_->losses();

@@ -42,6 +42,8 @@ class ToolOperator {
   // The recording that moves the handle, if any.
   [[nodiscard]] const RecordedDevice* recorded() const { return recorded_.get(); }
   [[nodiscard]] std::string_view device_name() const;
+  // What has pushed at a pointer by now. Empty for other devices.
+  [[nodiscard]] std::vector<std::string_view> pushed() const;
   // Number of times that devices were lost.
   [[nodiscard]] int losses() const;
   // Ends force and closes the devices.

@@ -152,6 +152,7 @@ TEST_F(PointerInRoom, DrillsLosesItsWindowAndDrillsOn) {
   EXPECT_TRUE(haptic.running());
 
   // The window comes back. Its button was held all the time, so the hand waits until it is pressed again.
+  input_.source = PointerSource::game_pad;
   open_window();
   ASSERT_TRUE(say_until_rests()) << haptic.err();
   say_for(1s);
@@ -169,6 +170,7 @@ TEST_F(PointerInRoom, DrillsLosesItsWindowAndDrillsOn) {
 
   const auto summary = read_json(stage / "hand.json");
   EXPECT_EQ(summary["device"], "pointer");
+  EXPECT_EQ(summary["pointer_sources"], nlohmann::json::array({"mouse", "game pad"}));
   EXPECT_EQ(summary["device_losses"], 1);
   EXPECT_EQ(summary["force_scale"], 1.0);
   const Table log = read_table(stage / "hand.csv");

@@ -168,9 +168,11 @@ void BoneView::follow_pad(const PadOrder& order, double dt_s) {
   if (order.toggles_spindle) pointer_.set_spindle(!pointer_.spindle());
   if (!updater_ || (pointer_.pushing() && !pad_pushes_)) return pointer_moved();  // the mouse or the pen is at work
   pad_leads_ = true;
+  pointer_.set_source(PointerSource::game_pad);
   if (order.fine != pad_fine_) pointer_.set_fine(pad_fine_ = order.fine);
-  if (!turn_rad.isZero()) pointer_.turn(camera(), turn_rad.x(), turn_rad.y());
-  if (!pointer_.on_bone() || !order.slide.isZero()) {
+  // A hand that pushes keeps its axis.
+  if (!pad_pushes_ && !turn_rad.isZero()) pointer_.turn(camera(), turn_rad.x(), turn_rad.y());
+  if (!order.slide.isZero() || (order.push_begins && !pointer_.on_bone())) {
     // While the hand pushes, it makes fine motions a tenth by itself.
     const Eigen::Vector2d slide = (pad_pushes_ ? 1.0 : scale) * order.slide;
     pointer_.slide(camera(), slide.x(), slide.y(), dt_s, updater_->surface());
@@ -276,9 +278,10 @@ void BoneView::resizeEvent(QResizeEvent* event) {
 
 void BoneView::mousePressEvent(QMouseEvent* event) {
   last_ = pressed_ = event->pos();
-  if (pad_pushes_) return;  // two hands do not push at one tool
+  if (pad_pushes_ && event->button() == Qt::LeftButton) return;  // two hands do not push at one tool
   camera_drag_ = event->button() == Qt::MiddleButton || !holding_;
   if (!holding_ || event->button() != Qt::LeftButton) return;
+  pointer_.set_source(PointerSource::mouse);
   point_at(event->pos());
   // Beside the bone there is nothing to push at. Then the button turns the bone.
   camera_drag_ = !pointer_.press();
@@ -298,6 +301,7 @@ void BoneView::mouseMoveEvent(QMouseEvent* event) {
   }
   if (!holding_ || pad_pushes_) return;
   pad_leads_ = false;
+  pointer_.set_source(PointerSource::mouse);
   pointer_.set_fine(event->modifiers() & Qt::ShiftModifier);
   if (event->buttons() & Qt::RightButton) {
     if (event->modifiers() & Qt::ControlModifier)
@@ -339,6 +343,7 @@ void BoneView::tabletEvent(QTabletEvent* event) {
     point_at(at);
   } else {
     last_ = at;
+    pointer_.set_source(PointerSource::pen);
     pointer_.set_fine(event->modifiers() & Qt::ShiftModifier);
     point_at(at);
     if (event->type() == QEvent::TabletPress && event->button() == Qt::LeftButton) {

@@ -1,5 +1,4 @@
-// A game pad in the window: it leads the tool of a BoneView, and its motors show the force. Emulated pads only have
-// been at it yet.
+// A game pad in the window: it leads the tool of a BoneView, and its motors show the force.
 #pragma once
 #include <QCoreApplication>
 #include <QElapsedTimer>

@@ -40,6 +40,7 @@ class ToolPointer {
   void set_spindle(bool on) { spindle_ = on; }
   void set_irrigation(bool on) { input_.irrigation = on; }
   void set_suction(bool on) { input_.suction = on; }
+  void set_source(PointerSource source) { input_.source = source; }
 
   [[nodiscard]] bool pushing() const { return input_.push; }
   [[nodiscard]] bool on_bone() const { return input_.on_bone; }

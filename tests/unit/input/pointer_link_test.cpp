@@ -36,6 +36,7 @@ PointerInput an_input() {
   input.spindle_rpm = 1200.0;
   input.tool = "drill-3.2";
   input.irrigation = input.suction = true;
+  input.source = PointerSource::game_pad;
   return input;
 }
 
@@ -157,6 +158,7 @@ TEST(PointerMessage, EachFieldOfTheWindowIsChecked) {
                        {"spindle", no_number(0.0, 1.0)},
                        {"spindle_rpm", no_number(0.0, 2e5)},
                        {"tool", kNoText},
+                       {"source", {nullptr, 2, true, "", "Mouse", "game pad ", std::string(513, 'x')}},
                        {"irrigation", kNoBool},
                        {"suction", kNoBool}},
                       input_refusal, {"irrigation", "suction"});

@@ -214,8 +214,9 @@ TEST_F(OnBall, AtAnEdgeTheToolWaitsForTheStick) {
   };
   slide(1.0, 5.0);
   EXPECT_TRUE(pointer_.on_bone());
-  // Where a ray from 100 mm touches a ball of 20 mm: y = −R² / 100 = −4 mm.
-  EXPECT_NEAR(pointer_.input().target_mm.x(), std::sqrt(400.0 - 16.0), 0.3);
+  // Where a ray from 100 mm touches a ball of 20 mm: y = −R² / 100 = −4 mm. A ray that passes within the edge by a
+  // step of 0.2 mm meets the ball √(2 R · 0.2 mm) = 2.8 mm before that, of which a fifth is to the side.
+  EXPECT_NEAR(pointer_.input().target_mm.x(), std::sqrt(400.0 - 16.0), 0.8);
   // The stick went on by 15 mm at most, so 1 s at 20 mm/s brings the tool back onto the ball.
   slide(-1.0, 1.2);
   EXPECT_LT(pointer_.input().target_mm.x(), 18.0);

@@ -831,6 +831,29 @@
         <source>The window closes when the bone is saved. Close it once more to give that up.</source>
         <translation>Das Fenster schließt nach dem Speichern. Noch einmal schließen bricht es ab.</translation>
     </message>
+    <message>
+        <source>Game pad</source>
+        <translation>Gamepad</translation>
+    </message>
+    <message>
+        <source>the left stick moves the tool, the right one turns it; the right trigger pushes, the left one or A runs the spindle; the shoulder buttons make motions a tenth; B undoes</source>
+        <translation>linker Stick bewegt das Werkzeug, rechter dreht es; rechter Trigger drückt, linker oder A lässt die Spindel laufen; mit den Schultertasten Bewegungen auf ein Zehntel; B macht rückgängig</translation>
+    </message>
+</context>
+<context>
+    <name>PadHand</name>
+    <message>
+        <source>The game pad</source>
+        <translation>Das Gamepad</translation>
+    </message>
+    <message>
+        <source>%1: choose a tool. The left stick moves it, the right trigger pushes.</source>
+        <translation>%1: Wählen Sie ein Werkzeug. Linker Stick bewegt es, rechter Trigger drückt.</translation>
+    </message>
+    <message>
+        <source>%1 was unplugged and has let the tool go.</source>
+        <translation>%1 ist nicht mehr angeschlossen und hat das Werkzeug losgelassen.</translation>
+    </message>
 </context>
 <context>
     <name>PracticeRoom</name>
