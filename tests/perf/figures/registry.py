@@ -91,6 +91,12 @@ FIGURES = [
            baseline="period of the mesh stream"),
     Figure("cut_to_picture_p99", "ms", "from a cut's end until the viewer has drawn it, 99th percentile", "rig",
            baseline="period of the mesh stream"),
+    Figure("cut_to_picture_frames_p50", "frames", "the median, less a period of the mesh stream, over the viewer's median "
+           "frame in the same run", "rig", ("<=", 1.5), baseline="the whole time, ms"),
+    Figure("cut_to_picture_frames_p99", "frames", "the same of the 99th percentile, over the same frame", "rig",
+           ("<=", 3.0), baseline="the whole time, ms"),
+    Figure("rig_frame_p50", "ms", "the viewer's frame of 640 x 480 meanwhile, in software, median", "rig",
+           baseline="99th percentile"),
     Figure("cut_to_sound_p50", "ms", "from a cutting state until it is in the sound, median", "rig"),
     Figure("cut_to_sound_p99", "ms", "from a cutting state until it is in the sound, 99th percentile", "rig"),
     # Required physics: phantom 5/20/5 mm at 1.9/0.3/1.9 g/cm3, drill 3.2 mm, 1000 rpm.
