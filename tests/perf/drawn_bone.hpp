@@ -1,5 +1,6 @@
 // A bone with its blocks, as a viewer receives them, for figures of the picture.
 #pragma once
+#include <algorithm>
 #include <span>
 #include <utility>
 #include <vector>
@@ -15,7 +16,7 @@ class DrawnBone {
  public:
   explicit DrawnBone(const Case& bone) : field_(bone, BodyId{}) {}
 
-  void cut(const Cut& cut) {
+  void apply(const Cut& cut) {
     const CutReport report = field_.apply(cut);
     (void)blocks_.touch(report.level, report.changed_leaves);
   }

@@ -3,10 +3,8 @@
 // how far the shaded normal turns from one pixel to the next, within a level of detail and where two levels meet, and
 // compares the outlines of both. Takes the case's folder, and a folder for pictures if they are wanted. Prints JSON.
 #include <vtkActor.h>
-#include <vtkFloatArray.h>
 #include <vtkNew.h>
 #include <vtkPolyData.h>
-#include <vtkPolyDataMapper.h>
 #include <vtkProperty.h>
 #include <vtkRenderWindow.h>
 #include <vtkRenderer.h>
@@ -17,9 +15,9 @@
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
+#include <filesystem>
 #include <functional>
 #include <map>
-#include <memory>
 #include <numbers>
 #include <string>
 #include <vector>
@@ -35,7 +33,7 @@ namespace osteon::test {
 namespace {
 
 constexpr int kWidth_px = 1280, kHeight_px = 720;
-constexpr double kGroove_mm = 14.0;
+constexpr double kGroove_mm = 14.0, kDeep_mm = 1.2;
 
 using Blocks = std::vector<ReceivedBlock>;
 
@@ -75,7 +73,7 @@ class FlatPicture {
   vtkNew<vtkRenderer> renderer_;
 };
 
-// Each pixel's level of detail, shaded normal and distance from the eye. No bone: the level is kNoLevel.
+// Each pixel's level of detail and shaded normal. No bone: the level is kNoLevel.
 constexpr int kNoLevel = 99;
 struct Pixel {
   int level = kNoLevel;
@@ -89,7 +87,7 @@ struct Seen {
   }
 };
 
-Seen seen(FlatPicture& flat, const Blocks& blocks, const CameraView& view) {
+Seen see(FlatPicture& flat, const Blocks& blocks, const CameraView& view) {
   constexpr int kLevelColour = 40;
   const Image normals = flat.draw(blocks, view, [](const ReceivedBlock& block, std::size_t v) {
     Colour colour;
@@ -116,8 +114,8 @@ Seen seen(FlatPicture& flat, const Blocks& blocks, const CameraView& view) {
 struct Jumps {
   std::vector<double> within, across;
 
-  // Pairs of pixels beside each other. Edges of the bone, where one part hides another, are no surface on which a
-  // normal could turn: the points that two pixels show must be near, and the surface must not be seen from its side.
+  // Pairs of pixels beside each other. Where one part of the bone hides another, there is no surface on which a normal
+  // could turn. So the points that both show must be near.
   void add(const Seen& seen, const SurfaceScene& surface, const CameraView& view) {
     const double pixel_mm = 2.0 * std::tan(0.5 * view.view_angle_rad) / kHeight_px;  // at a distance of 1 mm
     const auto take = [&](int x, int y, int x2, int y2) {
@@ -145,10 +143,11 @@ struct Jumps {
   }
 };
 
-// The outline of the bone: pixels of bone beside a pixel without. Counts those of each picture from which no pixel of
-// the other's outline is at most one pixel away.
+// Compares where two pictures show bone.
 struct Outlines {
-  int pixels = 0, apart = 0, differing = 0, all = 0;
+  int pixels = 0,
+      apart = 0;  // bone beside a pixel without; of these, without one of the other picture at most a pixel away
+  int all = 0, differing = 0;  // all pixels; those that are bone, or not, unlike the same pixel and all beside it there
 
   static bool outline(const Seen& seen, int x, int y) {
     return seen.bone(x, y) &&
@@ -157,7 +156,6 @@ struct Outlines {
   void add(const Seen& one, const Seen& other) {
     for (int y = 0; y < kHeight_px; ++y)
       for (int x = 0; x < kWidth_px; ++x) {
-        ++all;
         for (const auto& [from, to] : {std::pair(&one, &other), std::pair(&other, &one)}) {
           bool near = false, same = false;
           for (int dy = -1; dy <= 1; ++dy)
@@ -165,15 +163,13 @@ struct Outlines {
               near = near || outline(*to, x + dx, y + dy);
               same = same || to->bone(x + dx, y + dy) == from->bone(x, y);
             }
-          if (outline(*from, x, y)) ++pixels, apart += near ? 0 : 1;
-          if (!same && from == &one) ++differing;
+          pixels += outline(*from, x, y) ? 1 : 0;
+          apart += outline(*from, x, y) && !near ? 1 : 0;
+          differing += same ? 0 : 1;
+          ++all;
         }
       }
   }
-};
-
-struct CutPixels {
-  int on_cut = 0, off_cut = 0;
 };
 
 // The groove of a round burr: all points that its ball reaches.
@@ -181,11 +177,12 @@ struct Groove {
   Tool burr = *find_tool("burr-round-5");
   Vec3 from_mm, to_mm, out;
 
-  [[nodiscard]] Cut cut(double pitch_mm) const {
+  [[nodiscard]] Cut cut_at(double pitch_mm) const {
     Cut cut = straight_cut(burr, from_mm, to_mm, -out);
     cut.level = std::min(burr.cut_level, finest_level(pitch_mm));
     return cut;
   }
+  [[nodiscard]] Vec3 middle_mm() const { return 0.5 * (from_mm + to_mm); }
   [[nodiscard]] double outside_mm(const Vec3& at) const {
     const double radius_mm = 0.5 * burr.diameter_mm;
     const Vec3 centre = at - radius_mm * out - from_mm, along = to_mm - from_mm;
@@ -195,24 +192,26 @@ struct Groove {
 
 // Pixels of the cut's colour; bone has 1.07 times as much red as green, a cut 1.53 times. Off the cut is what lies
 // farther from the burr's way than a cell of the bone, for the pixel and for all beside it.
-CutPixels cut_pixels(const Image& image, const SurfaceScene& surface, const CameraView& view, const Groove& groove,
-                     double pitch_mm) {
-  CutPixels count;
-  for (int y = 0; y < kHeight_px; ++y)
-    for (int x = 0; x < kWidth_px; ++x) {
-      const auto& [r, g, b] = image.at(x, y);
-      if (r < 60 || r < 1.25 * g) continue;
-      bool on_cut = false;
-      for (int i = 0; i < 9 && !on_cut; ++i) {
-        const int dx = (i + 1) % 3 - 1, dy = (i / 3 + 1) % 3 - 1;  // the pixel itself first
-        const SightRay ray = ray_through(view, kWidth_px, kHeight_px, x + dx, y + dy);
-        const auto hit = surface.first_hit(ray.from_mm, ray.direction);
-        on_cut = hit && groove.outside_mm(hit->point_mm) < pitch_mm;
+struct CutPixels {
+  int on_cut = 0, off_cut = 0;
+
+  void add(const Image& image, const SurfaceScene& surface, const CameraView& view, const Groove& groove,
+           double pitch_mm) {
+    for (int y = 0; y < kHeight_px; ++y)
+      for (int x = 0; x < kWidth_px; ++x) {
+        const auto& [r, g, b] = image.at(x, y);
+        if (r < 60 || r < 1.25 * g) continue;
+        bool beside = false;
+        for (int i = 0; i < 9 && !beside; ++i) {
+          const int dx = (i + 1) % 3 - 1, dy = (i / 3 + 1) % 3 - 1;  // the pixel itself first
+          const SightRay ray = ray_through(view, kWidth_px, kHeight_px, x + dx, y + dy);
+          const auto hit = surface.first_hit(ray.from_mm, ray.direction);
+          beside = hit && groove.outside_mm(hit->point_mm) < pitch_mm;
+        }
+        ++(beside ? on_cut : off_cut);
       }
-      ++(on_cut ? count.on_cut : count.off_cut);
-    }
-  return count;
-}
+  }
+};
 
 SurfaceScene surface_of(const Blocks& blocks) {
   SurfaceScene surface;
@@ -239,6 +238,65 @@ double part(std::vector<double> values, double share) {
   return values[static_cast<std::size_t>(share * static_cast<double>(values.size() - 1))];
 }
 
+// A groove where the middle of this view meets the bone.
+Groove groove_at(const DrawnBone& bone, const CameraView& view) {
+  const SurfaceScene whole = surface_of(bone.received());
+  const auto hit = whole.first_hit(view.eye_mm, (view.target_mm - view.eye_mm).normalized());
+  OSTEON_CHECK(hit.has_value());
+  Groove groove;
+  groove.out = whole.mean_normal(hit->point_mm, 5.0).value_or(hit->normal);
+  const Vec3 along = 0.5 * kGroove_mm * groove.out.unitOrthogonal(), deep = hit->point_mm - kDeep_mm * groove.out;
+  groove.from_mm = deep - along;
+  groove.to_mm = deep + along;
+  return groove;
+}
+
+// From all round, and close to the groove.
+std::vector<CameraView> views_of(const CameraView& far_view, const Groove& groove) {
+  std::vector<CameraView> views;
+  for (int side = 0; side < 6; ++side) views.push_back(orbited(far_view, side * std::numbers::pi / 3.0, 0.0));
+  for (const double distance_mm : {60.0, 120.0}) {
+    CameraView close = far_view;
+    close.target_mm = groove.middle_mm();
+    close.eye_mm = close.target_mm + distance_mm * (groove.out + 0.3 * Vec3::UnitZ()).normalized();
+    views.push_back(close);
+  }
+  return views;
+}
+
+// What all pictures together show.
+struct Findings {
+  Jumps jumps;
+  Outlines outlines;
+  CutPixels cut;
+  std::map<int, std::size_t> triangles;  // of each level
+  std::size_t views = 0;
+};
+
+Findings look_at(DrawnBone& bone, const std::filesystem::path& pictures) {
+  const double h = bone.pitch_mm();
+  const Coord low = bone.samples().min, high = bone.samples().max;
+  const CameraView far_view = overview({h * Vec3(low.x, low.y, low.z), h * Vec3(high.x, high.y, high.z)});
+  const Groove groove = groove_at(bone, far_view);
+  bone.apply(groove.cut_at(h));
+  const Blocks full = bone.received();
+  FlatPicture flat;
+  Findings found;
+  for (const CameraView& view : views_of(far_view, groove)) {
+    bone.focus(std::array{focus_of(look_of(view, kWidth_px, kHeight_px), h), focus_of_tool(groove.middle_mm())});
+    const Blocks coarse = bone.received();
+    for (const ReceivedBlock& block : coarse) found.triangles[block.key.level] += block.mesh.triangles.size();
+    const SurfaceScene surface = surface_of(coarse);
+    const Seen near = see(flat, coarse, view);
+    found.jumps.add(near, surface, view);
+    found.outlines.add(near, see(flat, full, view));
+    const std::string name = std::to_string(found.views++) + ".png";
+    const Image image = shaded(coarse, view, pictures.empty() ? pictures : pictures / name);
+    found.cut.add(image, surface, view, groove, h);
+  }
+  return found;
+}
+
 int run(const char* folder, const std::filesystem::path& pictures) {
   const auto loaded = Case::load(folder);
   if (!loaded) {
@@ -254,60 +312,15 @@ int run(const char* folder, const std::filesystem::path& pictures) {
   ::setenv("LIBGL_ALWAYS_SOFTWARE", "1", 1);
 
   DrawnBone bone(*loaded);
-  const double h = bone.pitch_mm();
-  // The groove is where the middle of the overview looks.
-  const Coord low = bone.samples().min, high = bone.samples().max;
-  const CameraView far_view = overview({h * Vec3(low.x, low.y, low.z), h * Vec3(high.x, high.y, high.z)});
-  Groove groove;
-  {
-    const SurfaceScene whole = surface_of(bone.received());
-    const auto hit = whole.first_hit(far_view.eye_mm, (far_view.target_mm - far_view.eye_mm).normalized());
-    OSTEON_CHECK(hit.has_value());
-    groove.out = whole.mean_normal(hit->point_mm, 5.0).value_or(hit->normal);
-    const Vec3 along = 0.5 * kGroove_mm * groove.out.unitOrthogonal(), deep = hit->point_mm - 1.2 * groove.out;
-    groove.from_mm = deep - along;
-    groove.to_mm = deep + along;
-  }
-  bone.cut(groove.cut(h));
-
-  Jumps jumps;
-  Outlines outlines;
-  CutPixels on_picture;
-  std::map<int, std::size_t> levels;
-  const Blocks full = bone.received();
-  FlatPicture flat;
-  int number = 0;
-  // From all round, and close to the groove.
-  std::vector<CameraView> views;
-  for (int side = 0; side < 6; ++side) views.push_back(orbited(far_view, side * std::numbers::pi / 3.0, 0.0));
-  for (const double distance : {60.0, 120.0}) {
-    CameraView close = far_view;
-    close.target_mm = groove.from_mm;
-    close.eye_mm = close.target_mm + distance * (groove.out + 0.3 * Vec3::UnitZ()).normalized();
-    views.push_back(close);
-  }
-  for (const CameraView& view : views) {
-    const std::array focus{focus_of(look_of(view, kWidth_px, kHeight_px), h),
-                           focus_of_tool(0.5 * (groove.from_mm + groove.to_mm))};
-    bone.focus(focus);
-    const Blocks coarse = bone.received();
-    for (const ReceivedBlock& block : coarse) levels[block.key.level] += block.mesh.triangles.size();
-    const SurfaceScene surface = surface_of(coarse);
-    const Seen near = seen(flat, coarse, view), whole = seen(flat, full, view);
-    jumps.add(near, surface, view);
-    outlines.add(near, whole);
-    const std::string name = pictures.empty() ? "" : (pictures / (std::to_string(number++) + ".png")).string();
-    const CutPixels count = cut_pixels(shaded(coarse, view, name), surface, view, groove, h);
-    on_picture.on_cut += count.on_cut;
-    on_picture.off_cut += count.off_cut;
-  }
-  std::printf("{\"pitch_mm\": %.4f, \"views\": %zu, \"cut_pixels\": %d, \"off_cut_pixels\": %d, ", h, views.size(),
-              on_picture.on_cut, on_picture.off_cut);
+  const Findings found = look_at(bone, pictures);
+  const auto& [jumps, outlines, cut, triangles, views] = found;
+  std::printf("{\"pitch_mm\": %.4f, \"views\": %zu, \"cut_pixels\": %d, \"off_cut_pixels\": %d, ", bone.pitch_mm(),
+              views, cut.on_cut, cut.off_cut);
   std::printf("\"jump_within_max\": %.2f, \"jump_across_max\": %.2f, \"jump_across_p99\": %.2f, \"seam_pixels\": %zu, ",
               part(jumps.within, 1.0), part(jumps.across, 1.0), part(jumps.across, 0.99), jumps.across.size());
   std::printf("\"outline_pixels\": %d, \"outline_apart\": %d, \"pixels\": %d, \"differing\": %d", outlines.pixels,
               outlines.apart, outlines.all, outlines.differing);
-  for (const auto& [level, triangles] : levels) std::printf(", \"triangles_level_%d\": %zu", level, triangles);
+  for (const auto& [level, count] : triangles) std::printf(", \"triangles_level_%d\": %zu", level, count);
   std::printf("}\n");
   return 0;
 }
