@@ -143,11 +143,11 @@ struct Jumps {
   }
 };
 
-// Compares where two pictures show bone.
+// Compares where two pictures show bone. Pixels of both are counted. An outline is of pixels of bone beside one
+// without; it is apart where the other picture has none at most a pixel away. A pixel differs that is bone, or is none,
+// unlike the same pixel of the other picture and all beside it.
 struct Outlines {
-  int pixels = 0,
-      apart = 0;  // bone beside a pixel without; of these, without one of the other picture at most a pixel away
-  int all = 0, differing = 0;  // all pixels; those that are bone, or not, unlike the same pixel and all beside it there
+  int pixels = 0, differing = 0, outline_pixels = 0, apart = 0;
 
   static bool outline(const Seen& seen, int x, int y) {
     return seen.bone(x, y) &&
@@ -163,10 +163,10 @@ struct Outlines {
               near = near || outline(*to, x + dx, y + dy);
               same = same || to->bone(x + dx, y + dy) == from->bone(x, y);
             }
-          pixels += outline(*from, x, y) ? 1 : 0;
+          outline_pixels += outline(*from, x, y) ? 1 : 0;
           apart += outline(*from, x, y) && !near ? 1 : 0;
           differing += same ? 0 : 1;
-          ++all;
+          ++pixels;
         }
       }
   }
@@ -318,8 +318,8 @@ int run(const char* folder, const std::filesystem::path& pictures) {
               views, cut.on_cut, cut.off_cut);
   std::printf("\"jump_within_max\": %.2f, \"jump_across_max\": %.2f, \"jump_across_p99\": %.2f, \"seam_pixels\": %zu, ",
               part(jumps.within, 1.0), part(jumps.across, 1.0), part(jumps.across, 0.99), jumps.across.size());
-  std::printf("\"outline_pixels\": %d, \"outline_apart\": %d, \"pixels\": %d, \"differing\": %d", outlines.pixels,
-              outlines.apart, outlines.all, outlines.differing);
+  std::printf("\"outline_pixels\": %d, \"outline_apart\": %d, \"pixels\": %d, \"differing\": %d",
+              outlines.outline_pixels, outlines.apart, outlines.pixels, outlines.differing);
   for (const auto& [level, count] : triangles) std::printf(", \"triangles_level_%d\": %zu", level, count);
   std::printf("}\n");
   return 0;
