@@ -16,6 +16,7 @@ import kernels
 import laws
 import registry
 import rooms
+import viewing
 
 ROOT = Path(__file__).resolve().parents[3]
 sys.path.insert(0, str(ROOT / "deploy/session"))
@@ -152,8 +153,15 @@ def loop_figures(run, numbers):
 
 
 def latency_figures(numbers):
-    latency = numbers["latency_ms"]
+    latency, frame_ms = numbers["latency_ms"], numbers["programs"]["viewer"]["frame_ms"]
+
+    def frames_after_mesh(part):
+        """Frames from a cut to its picture, beyond a period of the mesh stream."""
+        return (latency["cut_to_picture"][part] - MESH_PERIOD_MS) / frame_ms["p50"], latency["cut_to_picture"][part]
     return {
+        "cut_to_picture_frames_p50": frames_after_mesh("p50"),
+        "cut_to_picture_frames_p99": frames_after_mesh("p99"),
+        "rig_frame_p50": (frame_ms["p50"], frame_ms["p99"]),
         "cut_to_commit_p50": (latency["cut_to_commit"]["p50"], None),
         "mesh_update_p50": (latency["cut_to_mesh"]["p50"], MESH_PERIOD_MS),
         "mesh_update_p99": (latency["cut_to_mesh"]["p99"], MESH_PERIOD_MS),
@@ -251,8 +259,8 @@ def scan(run):
 
 
 GROUPS = {**kernels.GROUPS, **devices.GROUPS, **authentication.GROUPS, **insiders.GROUPS,
-          **feel.GROUPS, **filters.GROUPS, **haptics.GROUPS, **laws.GROUPS, **rooms.GROUPS, "expert": expert,
-          "novice": novice, "rig": rig, "scan": scan, "real_imports": imports.real_imports,
+          **feel.GROUPS, **filters.GROUPS, **haptics.GROUPS, **laws.GROUPS, **rooms.GROUPS, **viewing.GROUPS,
+          "expert": expert, "novice": novice, "rig": rig, "scan": scan, "real_imports": imports.real_imports,
           "import_accuracy": imports.import_accuracy,
           "phantoms": imports.phantoms,
           "import_cost": imports.import_cost,

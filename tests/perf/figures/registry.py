@@ -91,6 +91,12 @@ FIGURES = [
            baseline="period of the mesh stream"),
     Figure("cut_to_picture_p99", "ms", "from a cut's end until the viewer has drawn it, 99th percentile", "rig",
            baseline="period of the mesh stream"),
+    Figure("cut_to_picture_frames_p50", "frames", "the median, less a period of the mesh stream, over the viewer's "
+           "median frame in the same run", "rig", ("<=", 1.5), baseline="the whole time, ms"),
+    Figure("cut_to_picture_frames_p99", "frames", "the same of the 99th percentile, over the same frame", "rig",
+           ("<=", 3.0), baseline="the whole time, ms"),
+    Figure("rig_frame_p50", "ms", "the viewer's frame of 640 x 480 meanwhile, in software, median", "rig",
+           baseline="99th percentile"),
     Figure("cut_to_sound_p50", "ms", "from a cutting state until it is in the sound, median", "rig"),
     Figure("cut_to_sound_p99", "ms", "from a cutting state until it is in the sound, 99th percentile", "rig"),
     # Required physics: phantom 5/20/5 mm at 1.9/0.3/1.9 g/cm3, drill 3.2 mm, 1000 rpm.
@@ -236,6 +242,28 @@ FIGURES = [
            baseline="vtkFlyingEdges3D on the same samples"),
     Figure("mesh_decode", "us", "rebuilding one block of surface from its bytes", "surface",
            baseline="vtkFlyingEdges3D on the same samples"),
+    # The picture: frames of 1280 x 720 in software, in turns in one run. Copies of changed meshes are in the times.
+    Figure("scene_changed_over_rest", "ratio", "a frame after five of 500 blocks all over a bone changed, over one of "
+           "the same bone at rest", "scene", ("<=", 1.1)),
+    Figure("scene_frame_changed", "ms", "the former, median", "scene", baseline="at rest"),
+    Figure("scene_rate_over_vtk", "ratio", "frames a second of a million triangles over those of VTK alone, with one "
+           "mapper and the same light, that leaves out back faces too", "scene", (">=", 0.9)),
+    Figure("scene_rate_over_vtk_with_backs", "ratio", "the same, with back faces as VTK draws them unasked", "scene"),
+    Figure("scene_frame_million", "ms", "a frame of a million triangles, median", "scene",
+           baseline="VTK alone, without back faces"),
+    # A skull with a groove from eight sides, coarse where nobody looks or works, beside the same in full.
+    Figure("picture_skull_off_cut_pixels", "count", "pixels of a cut's colour farther from the tool's way than a cell "
+           "of the bone", "picture_skull", ("==", 0)),
+    Figure("picture_skull_cut_pixels", "count", "pixels of a cut's colour on the cut; without them the former would "
+           "prove nothing", "picture_skull", (">=", 1000)),
+    Figure("picture_skull_seam_jump", "ratio", "largest turn of the shaded normal from a pixel to the next where two "
+           "levels of detail meet, over the largest within a level", "picture_skull", ("<=", 2.0)),
+    Figure("picture_skull_seam_pixels", "count", "pairs of pixels where that was measured", "picture_skull",
+           (">=", 1000)),
+    Figure("picture_skull_outline_differs", "percent", "pixels that show bone with coarse parts or in full, and not in "
+           "the other picture, nor beside there", "picture_skull", ("<=", 0.1)),
+    Figure("picture_skull_outline_apart", "percent", "pixels of both outlines that are farther than one pixel from the "
+           "other", "picture_skull"),
     # Accuracy of cuts at random positions and orientations. The worst trial decides.
     *[figure for body,
       what in (("sphere", "a sphere cut by the 3.2 mm burr"), ("hole", "a hole drilled through a slab"),
