@@ -31,7 +31,10 @@ struct GamePad::Impl {
   PadState state;
 
   void close() {
-    if (pad != nullptr) SDL_GameControllerClose(pad);  // stops the motors
+    if (pad == nullptr) return;
+    // Closing does not stop them while somebody else has the pad open.
+    if (SDL_GameControllerGetAttached(pad)) SDL_GameControllerRumble(pad, 0, 0, 0);
+    SDL_GameControllerClose(pad);
     pad = nullptr;
     state = {};
   }
