@@ -608,8 +608,9 @@ void MainWindow::show_help() {
       {tr("Left button, held"), tr("the hand pushes")},
       {tr("Wheel"), tr("how hard the hand pushes")},
       {tr("Pen"), tr("its tip pushes, as hard as you press it")},
-      {tr("Game pad"), tr("the left stick moves the tool, the right one turns it; the right trigger pushes, the left "
-                          "one or A runs the spindle; the shoulder buttons make motions a tenth; B undoes")},
+      {tr("Sticks of a game pad"), tr("the left one moves the tool, the right one turns it")},
+      {tr("Triggers of a game pad"), tr("the right one pushes, the left one runs the spindle")},
+      {tr("Buttons of a game pad"), tr("A: spindle, B: undo; those at the shoulders: motions at a tenth")},
       {tr("Right button, dragged"), tr("turns the tool; with Ctrl about its own axis")},
       {tr("Shift"), tr("motions at a tenth")},
       {tr("Space"), tr("spindle on or off")},

@@ -18,7 +18,7 @@ struct PadFeel {
   bool cuts = false;  // material goes
 };
 
-// [GUI thread] No call waits.
+// [GUI thread]
 class PadHand {
   Q_DECLARE_TR_FUNCTIONS(PadHand)
 

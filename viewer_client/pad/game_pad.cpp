@@ -31,7 +31,10 @@ struct GamePad::Impl {
   PadState state;
 
   void close() {
-    if (pad != nullptr) SDL_GameControllerClose(pad);  // stops the motors
+    if (pad == nullptr) return;
+    // Closing does not stop them while somebody else has the pad open.
+    if (SDL_GameControllerGetAttached(pad)) SDL_GameControllerRumble(pad, 0, 0, 0);
+    SDL_GameControllerClose(pad);
     pad = nullptr;
     state = {};
   }
@@ -52,7 +55,7 @@ GamePad::GamePad() : impl_(std::make_unique<Impl>()) {
   SDL_SetHint(SDL_HINT_NO_SIGNAL_HANDLERS, "1");
   // Without a window of SDL's own no pad would be in front. Who looks at which window is known to the caller.
   SDL_SetHint(SDL_HINT_JOYSTICK_ALLOW_BACKGROUND_EVENTS, "1");
-  // SDL's own drivers would open raw devices, also those of other makers. The kernel's know all pads with motors.
+  // SDL's own drivers would open raw devices, which others may hold. The kernel's run the motors too.
   SDL_SetHint(SDL_HINT_JOYSTICK_HIDAPI, "0");
   SDL_SetHint(SDL_HINT_ACCELEROMETER_AS_JOYSTICK, "0");
   impl_->started = SDL_InitSubSystem(SDL_INIT_GAMECONTROLLER) == 0;

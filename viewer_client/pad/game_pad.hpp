@@ -7,7 +7,7 @@
 
 namespace osteon {
 
-// The first pad that is there. No call waits. [one thread: that of the constructor]
+// The first pad that is there. [one thread: that of the constructor]
 class GamePad {
  public:
   enum class Change { none, opened, lost };

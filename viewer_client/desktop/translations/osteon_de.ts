@@ -836,8 +836,28 @@
         <translation>Gamepad</translation>
     </message>
     <message>
-        <source>the left stick moves the tool, the right one turns it; the right trigger pushes, the left one or A runs the spindle; the shoulder buttons make motions a tenth; B undoes</source>
-        <translation>linker Stick bewegt das Werkzeug, rechter dreht es; rechter Trigger drückt, linker oder A lässt die Spindel laufen; mit den Schultertasten Bewegungen auf ein Zehntel; B macht rückgängig</translation>
+        <source>Sticks of a game pad</source>
+        <translation>Sticks eines Gamepads</translation>
+    </message>
+    <message>
+        <source>the left one moves the tool, the right one turns it</source>
+        <translation>der linke bewegt das Werkzeug, der rechte dreht es</translation>
+    </message>
+    <message>
+        <source>Triggers of a game pad</source>
+        <translation>Trigger eines Gamepads</translation>
+    </message>
+    <message>
+        <source>the right one pushes, the left one runs the spindle</source>
+        <translation>der rechte drückt, der linke lässt die Spindel laufen</translation>
+    </message>
+    <message>
+        <source>Buttons of a game pad</source>
+        <translation>Tasten eines Gamepads</translation>
+    </message>
+    <message>
+        <source>A: spindle, B: undo; those at the shoulders: motions at a tenth</source>
+        <translation>A: Spindel, B: rückgängig; Schultertasten: Bewegungen auf ein Zehntel</translation>
     </message>
 </context>
 <context>
