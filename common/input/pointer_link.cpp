@@ -26,13 +26,13 @@ std::string encode(const PointerInput& input) {
               {"rotation", numbers(input.rotation_bone_tool)},
               {"on_bone", input.on_bone},
               {"push", input.push},
+              {"irrigation", input.irrigation},
+              {"suction", input.suction},
               {"push_n", input.push_n},
               {"fine", input.fine},
               {"spindle", input.spindle},
               {"spindle_rpm", input.spindle_rpm},
               {"tool", shortened(input.tool)},
-              {"irrigation", input.irrigation},
-              {"suction", input.suction},
               {"source", name_of(input.source)}}
       .dump(-1, ' ', false, json::error_handler_t::replace);
 }
@@ -62,13 +62,13 @@ Result<PointerInput> read_pointer_input(std::string_view text) {
   input.rotation_bone_tool = fields->rotation("rotation");
   input.on_bone = fields->yes("on_bone");
   input.push = fields->yes("push");
+  input.irrigation = fields->yes_if_given("irrigation");
+  input.suction = fields->yes_if_given("suction");
   input.push_n = fields->number("push_n", kLeastPush_n, kMostPush_n);
   input.fine = fields->yes("fine");
   input.spindle = fields->number("spindle", 0.0, 1.0);
   input.spindle_rpm = fields->number("spindle_rpm", 0.0, kMostRpm);
   input.tool = fields->text("tool");
-  input.irrigation = fields->yes_if_given("irrigation");
-  input.suction = fields->yes_if_given("suction");
   input.source = static_cast<PointerSource>(fields->choice("source", kPointerSources));
   if (const Result<void> read = fields->outcome(); !read) return tl::unexpected(read.error());
   return input;

@@ -28,13 +28,13 @@ struct PointerInput {
   Eigen::Quaterniond rotation_bone_tool = Eigen::Quaterniond::Identity();  // the hand pushes along the tool's +z
   bool on_bone = false;      // false: the pointer is not over bone; the tool is lifted off and waits
   bool push = false;         // the button is held
+  bool irrigation = false;   // of the other hand; a message without this field: off
+  bool suction = false;      // likewise
   double push_n = 10.0;      // kLeastPush_n to kMostPush_n
   bool fine = false;         // motions across the axis at a tenth, while the hand pushes
   double spindle = 0.0;      // share of the spindle's speed, 0 to 1
   double spindle_rpm = 0.0;  // its full speed; 0: the tool's own
   std::string tool{};        // that the hand is to hold; empty: no change
-  bool irrigation = false;   // of the other hand; a message without this field: off
-  bool suction = false;      // likewise
   PointerSource source = PointerSource::mouse;
   friend bool operator==(const PointerInput&, const PointerInput&) = default;
 };

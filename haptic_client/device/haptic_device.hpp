@@ -32,11 +32,6 @@ struct DeviceLimits {
   Vec3 workspace_middle_mm = Vec3::Zero();
 };
 
-// The bits of what the other hand does.
-[[nodiscard]] constexpr std::uint32_t other_hand(bool irrigation, bool suction) noexcept {
-  return (irrigation ? kIrrigation : 0u) | (suction ? kSuction : 0u);
-}
-
 enum class DeviceStatus : std::uint8_t {
   ok,
   warm,    // motors are warm: only the continuous force may be commanded
@@ -57,6 +52,11 @@ enum DeviceButton : std::uint32_t {
   kIrrigation = 4,
   kSuction = 8,
 };
+
+// The bits of what the other hand does.
+[[nodiscard]] constexpr std::uint32_t other_hand(bool irrigation, bool suction) noexcept {
+  return (irrigation ? kIrrigation : 0u) | (suction ? kSuction : 0u);
+}
 
 struct DeviceReading {
   Pose pose_device_tool;  // the handle

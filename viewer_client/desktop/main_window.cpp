@@ -59,7 +59,7 @@ constexpr double kSamePlace_mm = 1.0;
 constexpr const char* kFirstTool = "drill-3.2";
 
 // What changes the room, beside the tools.
-constexpr const char* kWorkActions[] = {"undo", "redo", "mark", "put_down", "spindle", "irrigation", "suction"};
+constexpr const char* kWorkActions[] = {"undo", "redo", "mark", "put_down", "spindle"};
 constexpr const char* kOpeningActions[] = {"open_case", "import_scan", "join_room"};
 
 // The first file or folder that somebody drags over the window. Empty: none on this computer.
@@ -182,8 +182,9 @@ void MainWindow::enable_room_actions(bool on) {
   for (QAction* action : room_actions_) action->setEnabled(on);
   tools_->setEnabled(on && !watching_);
   for (QDockWidget* panel : findChildren<QDockWidget*>())
-    panel->setEnabled(on || panel->objectName() == "connection_panel");                // it says why there is no room
-  for (QAction* action : {irrigation_, suction_}) action->setEnabled(on && pointer_);  // its hand has another one
+    panel->setEnabled(on || panel->objectName() == "connection_panel");  // it says why there is no room
+  // A pointer's hand has another one. Who watches has no pointer.
+  for (QAction* action : {irrigation_, suction_}) action->setEnabled(on && pointer_);
   if (watching_)
     for (const char* name : kWorkActions) findChild<QAction*>(name)->setEnabled(false);
 }
@@ -480,7 +481,7 @@ void MainWindow::leave_room() {
   address_.clear();
   room_name_.clear();
   setWindowTitle("Osteon");
-  for (QLabel* label : {other_hand_, device_, position_, connection_}) label->clear();
+  for (QLabel* label : {device_, position_, connection_}) label->clear();
   if (!maker_) start_->end_work({});
   start_->refresh();
   pages_->setCurrentWidget(start_);
@@ -530,6 +531,7 @@ void MainWindow::rest_other_hand() {
   view_->pointer().set_irrigation(false);
   view_->pointer().set_suction(false);
   for (QAction* action : {irrigation_, suction_}) action->setChecked(false);
+  other_hand_->clear();
 }
 
 void MainWindow::place_item(const SurfaceHit& hit) {

@@ -6,8 +6,8 @@
 
 namespace osteon {
 
-// Lines: the tool and its activity, spindle speed, physical force, depth, metal in its way, full
-// flutes, what the other hand does, density at the contact.
+// Lines: the tool and its activity, spindle speed, physical force, depth, metal in its way, full flutes, what the other
+// hand does, density at the contact.
 [[nodiscard]] std::string gauge_text(const CuttingState& state);
 
 }  // namespace osteon

@@ -15,6 +15,8 @@ class ToolPointer {
  public:
   // The tool that the hand is to hold. Its turn begins anew.
   void take(const std::string& tool);
+  void set_irrigation(bool on) { input_.irrigation = on; }
+  void set_suction(bool on) { input_.suction = on; }
   void set_spindle_speed(double rpm) { input_.spindle_rpm = rpm; }  // 0: the tool's own
 
   // The pointer moved to this ray. While nobody pushes, the tool rests where the ray meets the surface and points along
@@ -38,8 +40,6 @@ class ToolPointer {
   void set_push(double newtons);
   void set_fine(bool fine) { input_.fine = fine; }
   void set_spindle(bool on) { spindle_ = on; }
-  void set_irrigation(bool on) { input_.irrigation = on; }
-  void set_suction(bool on) { input_.suction = on; }
   void set_source(PointerSource source) { input_.source = source; }
 
   [[nodiscard]] bool pushing() const { return input_.push; }

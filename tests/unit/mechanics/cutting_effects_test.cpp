@@ -142,6 +142,24 @@ TEST(Irrigation, NeverHoldsMoreChipsThanDryFlutesOrLessThanNone) {
   }
 }
 
+// Without water the sum is what it was before there was any, to the bit: recordings and journals repeat.
+TEST(Irrigation, WithoutItNothingChangesToTheBit) {
+  std::minstd_rand random(7);
+  std::uniform_real_distribution<double> share(0.0, 1.0);
+  CuttingEffects effects(*find_tool("drill-3.2"));
+  double level = 0.0;
+  for (int i = 0; i < 20'000; ++i) {
+    EffectMoment moment{.spindle_rpm = 1000, .engaged = share(random), .density_g_cm3 = 1.9 * share(random)};
+    moment.advance_mm = 0.05 * (share(random) - 0.2);
+    moment.cutting = moment.advance_mm > 0.0;
+    effects.step(moment, kDt);
+    if (moment.cutting) level += moment.engaged * moment.density_g_cm3 / 1.9 * moment.advance_mm / (10.0 * 3.2);
+    if (!moment.cutting) level -= -moment.advance_mm / (1.5 * 3.2);
+    level = std::clamp(level, 0.0, 1.0);
+    ASSERT_EQ(effects.clogging().level(), level) << i;
+  }
+}
+
 // The share of the point in bone while the point comes out: from 1 to 0.
 std::vector<double> coming_out(int steps) {
   std::vector<double> shares;
