@@ -108,14 +108,14 @@ std::set<std::string> names_in(const fs::path& folder) {
 // Files that this program writes end at a size, as if the disk were full. Children that run already do not notice.
 class SmallFiles {
  public:
-  explicit SmallFiles(rlim_t bytes) : handler_(std::signal(SIGXFSZ, SIG_IGN)) {
+  explicit SmallFiles(rlim_t bytes) : handler_(::signal(SIGXFSZ, SIG_IGN)) {
     ::getrlimit(RLIMIT_FSIZE, &before_);
     const rlimit small{bytes, before_.rlim_max};
     ::setrlimit(RLIMIT_FSIZE, &small);
   }
   ~SmallFiles() {
     ::setrlimit(RLIMIT_FSIZE, &before_);
-    std::signal(SIGXFSZ, handler_);
+    ::signal(SIGXFSZ, handler_);
   }
   SmallFiles(const SmallFiles&) = delete;
   SmallFiles& operator=(const SmallFiles&) = delete;
@@ -383,7 +383,7 @@ TEST_F(WrongUse, DoubleClicksOnEverythingDoNoHarm) {
     std::vector<QPointer<QAbstractButton>> buttons;
     for (auto* button : window_->findChildren<QAbstractButton*>()) buttons.emplace_back(button);
     for (const auto& button : buttons)
-      if (button && button->isVisible() && button->isEnabled()) QTest::mouseDClick(button, Qt::LeftButton);
+      if (button && button->isVisible() && button->isEnabled()) QTest::mouseDClick(button.data(), Qt::LeftButton);
   };
   // On the start page, with what opens a dialog.
   all_buttons_twice();
