@@ -275,8 +275,7 @@ struct Findings {
 
 Findings look_at(DrawnBone& bone, const std::filesystem::path& pictures) {
   const double h = bone.pitch_mm();
-  const Coord low = bone.samples().min, high = bone.samples().max;
-  const CameraView far_view = overview({h * Vec3(low.x, low.y, low.z), h * Vec3(high.x, high.y, high.z)});
+  const CameraView far_view = overview({position_mm(bone.samples().min, h), position_mm(bone.samples().max, h)});
   const Groove groove = groove_at(bone, far_view);
   bone.apply(groove.cut_at(h));
   const Blocks full = bone.received();
