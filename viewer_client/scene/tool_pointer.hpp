@@ -22,7 +22,7 @@ class ToolPointer {
   // The pointer moved to this ray. While nobody pushes, the tool rests where the ray meets the surface and points along
   // the mean normal into the bone. While somebody pushes, the tool keeps its direction and moves across it.
   void move(const SightRay& ray, const SurfaceScene& surface);
-  // A stick moved the pointer for dt_s. `right` and `up`: −1 … 1 of the fastest, in the picture's axes. The tool stays
+  // A stick moved the pointer for dt_s. `right` and `up`: -1 to 1 of the fastest, in the picture's axes. The tool stays
   // on bone: a gap is crossed, and at an edge it waits. Without a place on bone it begins in the picture's middle, or
   // next to it. While somebody pushes, the tool moves across its axis, no faster than a hand can follow.
   void slide(const CameraView& view, double right, double up, double dt_s, const SurfaceScene& surface);
