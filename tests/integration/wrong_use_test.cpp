@@ -3,29 +3,20 @@
 #include <gtest/gtest.h>
 #include <signal.h>
 #include <sys/resource.h>
-#include <sys/socket.h>
-#include <sys/un.h>
 #include <unistd.h>
 
-#include <QAbstractButton>
 #include <QAction>
 #include <QApplication>
-#include <QDialog>
-#include <QDockWidget>
 #include <QLabel>
 #include <QListWidget>
 #include <QLocale>
-#include <QMenu>
-#include <QPointer>
 #include <QPushButton>
 #include <QSettings>
 #include <QStatusBar>
 #include <QTest>
-#include <QTimer>
 #include <QToolButton>
 #include <QWindow>
 #include <algorithm>
-#include <cerrno>
 #include <chrono>
 #include <cstdlib>
 #include <fstream>
@@ -151,25 +142,6 @@ class FullDisk {
  private:
   test::FailingWrites failing_;
   std::map<std::string, std::optional<std::string>> before_;
-};
-
-// Closes whatever waits for an answer, as Escape does.
-class Impatience : public QObject {
- public:
-  Impatience() {
-    connect(&timer_, &QTimer::timeout, this, [this] {
-      if (QWidget* popup = QApplication::activePopupWidget()) popup->close();
-      if (auto* dialog = qobject_cast<QDialog*>(QApplication::activeModalWidget())) {
-        ++closed;
-        dialog->reject();
-      }
-    });
-    timer_.start(10);
-  }
-  int closed = 0;
-
- private:
-  QTimer timer_;
 };
 
 class WrongUse : public testing::Test {
@@ -364,79 +336,6 @@ TEST_F(WrongUse, ADiskThatFillsUpEndsTheSessionAndKeepsTheCut) {
   EXPECT_TRUE(cut());
 }
 
-TEST_F(WrongUse, ADoubleClickOpensASessionOnce) {
-  open();
-  window_->close();
-  begin();
-  auto* list = window_->findChild<QListWidget*>("recent");
-  ASSERT_GE(list->count(), 1);
-  const QPoint at = list->visualItemRect(list->item(0)).center();
-  QTest::mouseDClick(list->viewport(), Qt::LeftButton, {}, at);
-  ASSERT_TRUE(until([&] { return view_->surface_shown(); })) << problem();
-  EXPECT_EQ(children("osteon-server").size(), 1u);
-}
-
-TEST_F(WrongUse, DoubleClicksOnEverythingDoNoHarm) {
-  Impatience impatience;
-  // What one of them opens may be gone when the next one's turn comes.
-  const auto all_buttons_twice = [&] {
-    std::vector<QPointer<QAbstractButton>> buttons;
-    for (auto* button : window_->findChildren<QAbstractButton*>()) buttons.emplace_back(button);
-    for (const auto& button : buttons)
-      if (button && button->isVisible() && button->isEnabled()) QTest::mouseDClick(button.data(), Qt::LeftButton);
-  };
-  // On the start page, with what opens a dialog.
-  all_buttons_twice();
-  EXPECT_GE(impatience.closed, 3);
-  EXPECT_TRUE(at_start());
-  const auto all_twice = [&](const std::set<QString>& but) {
-    int count = 0;
-    std::vector<QPointer<QAction>> actions;
-    for (auto* action : window_->findChildren<QAction*>())
-      if (action->menu() == nullptr && !but.contains(action->objectName())) actions.emplace_back(action);
-    for (const auto& action : actions)
-      for (int time = 0; time < 2; ++time)
-        if (action && action->isEnabled() && action->isVisible()) {
-          action->trigger();
-          ++count;
-        }
-    return count;
-  };
-  const std::set<QString> ends{"quit", "start_page"};
-  all_twice(ends);
-  open();
-  EXPECT_GT(all_twice(ends), 100);
-  all_buttons_twice();
-  for (auto* dialog : window_->findChildren<QDialog*>()) dialog->close();
-  QTest::qWait(50);
-  EXPECT_EQ(children("osteon-server").size(), 1u);
-  // The window works on.
-  window_->activateWindow();
-  for (auto* panel : window_->findChildren<QDockWidget*>()) panel->hide();
-  drill(middle());
-  EXPECT_TRUE(until([&] { return cut(); })) << problem();
-  release(middle());
-  window_->findChild<QAction*>("start_page")->trigger();
-  window_->findChild<QAction*>("start_page")->trigger();
-  EXPECT_TRUE(at_start());
-  window_->findChild<QAction*>("quit")->trigger();
-  window_->findChild<QAction*>("quit")->trigger();
-  EXPECT_FALSE(window_->isVisible());
-  QSettings().remove("window");
-}
-
-TEST_F(WrongUse, ADoubleClickPlacesOnePin) {
-  open();
-  window_->findChild<QToolButton*>("pin")->defaultAction()->trigger();
-  for (int click = 0; click < 2; ++click) {
-    press(middle());
-    release(middle());
-  }
-  ASSERT_TRUE(until([&] { return view_->updater()->items().size() == 1; })) << problem();
-  QTest::qWait(300);
-  EXPECT_EQ(view_->updater()->items().size(), 1u);
-}
-
 TEST_F(WrongUse, AWindowThatIsClosedWhileItSavesFinishesTheFile) {
   const fs::path file = desk_->temp() / "closing.osteon";
   open();
@@ -627,54 +526,6 @@ TEST_F(WrongUse, AKilledAudioClientComesBackAndIsGivenUpInOneSentence) {
   release(middle());
   for (int time = 0; time < 2; ++time) window_->findChild<QAction*>("sound")->trigger();
   EXPECT_TRUE(until([&] { return children("osteon-audio").size() == 1; })) << problem();
-}
-
-TEST_F(WrongUse, AServerThatIsKilledAgainAndAgainEndsTheRoomInOneSentence) {
-  open();
-  pid_t killed = 0;
-  for (int time = 0; time < 3; ++time) {
-    std::vector<pid_t> now;
-    // It must have said where it listens, or its end is a start that failed.
-    ASSERT_TRUE(until([&] {
-      now = children("osteon-server");
-      return now.size() == 1 && now[0] != killed && fs::exists(session() / "logs" / "address");
-    })) << problem();
-    ASSERT_EQ(::kill(killed = now[0], SIGKILL), 0);
-  }
-  EXPECT_EQ(refused(), "osteon-server was ended by force or crashed.");
-  const fs::path last = session();
-  open(last);
-}
-
-TEST_F(WrongUse, ARoomThatOthersRunGoesAndComesBack) {
-  // In a room to practise in. It ends, because the window is in one room only.
-  open();
-  test::Process server(test::program("osteon-server"), {"--case", desk_->bone().string(), "--plain", "--listen",
-                                                        "127.0.0.1:0", "--address-file", desk_->temp() / "address"});
-  ASSERT_TRUE(until([&] { return bytes_of(desk_->temp() / "address").ends_with('\n'); })) << server.err();
-  const QString address = QString::fromStdString(bytes_of(desk_->temp() / "address")).trimmed();
-  window_->join({address, {}, {}, {}});
-  EXPECT_TRUE(children("osteon-haptic").empty());
-  ASSERT_TRUE(until([&] { return view_->surface_shown(); })) << problem();
-  ASSERT_TRUE(until([&] { return label("connection") == "Connected to " + address; })) << problem();
-
-  server.signal(SIGKILL);
-  EXPECT_TRUE(until([&] { return label("connection") == "Connection lost, trying again"; })) << problem();
-  window_->findChild<QAction*>("undo")->trigger();
-  server = test::Process(test::program("osteon-server"),
-                         {"--case", desk_->bone().string(), "--plain", "--listen", address.toStdString()});
-  EXPECT_TRUE(until([&] { return label("connection") == "Connected to " + address; })) << problem();
-  EXPECT_EQ(server.terminate(), 0);
-
-  // Nobody is there. The page says so, and everything else can be begun meanwhile and afterwards.
-  window_->join({address, {}, {}, {}});
-  EXPECT_EQ(label("words"), "Joining the room at " + address);
-  EXPECT_FALSE(at_start());
-  window_->findChild<QPushButton*>("cancel")->click();
-  EXPECT_TRUE(at_start());
-  window_->join({address, {}, {}, {}});
-  EXPECT_TRUE(until([&] { return label("words").contains("nothing listens at"); })) << problem();
-  EXPECT_TRUE(at_start());
 }
 
 }  // namespace
