@@ -33,7 +33,7 @@ class PadHand {
   // To be called at the rate at which the pad is read. Without a pad it only looks for one, once a second.
   // `may_act`: the window is the one in front. Otherwise the pad holds nothing and rests.
   void tick(bool may_act, const PadFeel& feel);
-  // No more ticks for now: the pad holds nothing and rests.
+  // Ticks pause until the next one: the pad holds nothing and rests.
   void rest();
 
  private:
