@@ -13,68 +13,35 @@
 #include <memory>
 #include <string>
 
-#include "tests/integration/desk.hpp"
+#include "tests/integration/window_bench.hpp"
 #include "tests/support/pad/virtual_pad.hpp"
-#include "viewer_client/desktop/bone_view.hpp"
-#include "viewer_client/desktop/main_window.hpp"
 
 namespace osteon {
 namespace {
 
 using namespace std::chrono_literals;
 
-class PadTest : public testing::Test {
+class PadTest : public test::WindowBench {
  protected:
   void SetUp() override {
-    ASSERT_TRUE(desk_.stands()) << "Xvfb, of Debian's package xvfb, did not start";
-    ::setenv("PULSE_SERVER", ("unix:" + (desk_.temp() / "nobody").string()).c_str(), 1);
-    window_ = std::make_unique<MainWindow>();
-    window_->setGeometry(0, 0, 1280, 900);
-    window_->show();
-    window_->activateWindow();
-    ASSERT_TRUE(QTest::qWaitForWindowActive(window_.get(), 30000));
-    view_ = window_->findChild<BoneView*>("bone");
-    ASSERT_NE(view_, nullptr);
-    window_->practise(desk_.bone());
-    ASSERT_TRUE(until([&] { return view_->surface_shown(); })) << said();
-    view_->look_from(Vec3(0.05, -0.05, 1));
-    ASSERT_TRUE(until([&] { return label("device") == "Pointer"; })) << said();
+    plug_ = std::make_unique<test::VirtualPad>();  // before the window: it hides the pads of this machine
+    WindowBench::SetUp();
+    open();
   }
-  void TearDown() override { window_.reset(); }
-
-  template <class Condition>
-  [[nodiscard]] static bool until(Condition condition) {
-    const auto deadline = std::chrono::steady_clock::now() + 60s;
-    while (!condition()) {
-      if (std::chrono::steady_clock::now() > deadline) return false;
-      QTest::qWait(20);
-    }
-    return true;
+  void TearDown() override {
+    WindowBench::TearDown();
+    plug_.reset();
   }
-  [[nodiscard]] QString label(const char* name) const {
-    const auto* found = window_->findChild<QLabel*>(name);
-    return found != nullptr ? found->text() : QString();
-  }
-  [[nodiscard]] std::string said() const { return window_->statusBar()->currentMessage().toStdString(); }
   [[nodiscard]] bool says(const char* words) const { return window_->statusBar()->currentMessage().contains(words); }
-  [[nodiscard]] bool cut() const { return view_->updater() != nullptr && view_->updater()->surface().any_cut_face(); }
-  void take_drill() {
-    auto* button = window_->findChild<QToolButton*>("drill");
-    ASSERT_NE(button, nullptr);
-    QTest::mouseClick(button, Qt::LeftButton);
-  }
 
-  test::Desk desk_;
-  test::VirtualPad plug_;  // before the window: it hides the pads of this machine
-  std::unique_ptr<MainWindow> window_;
-  BoneView* view_ = nullptr;
+  std::unique_ptr<test::VirtualPad> plug_;
 };
 
 TEST_F(PadTest, APadDrillsRumblesUndoesAndLetsGoWhenItIsUnplugged) {
   // Plugged in while the room is open.
-  ASSERT_TRUE(plug_.plug_in());
-  ASSERT_TRUE(until([&] { return says("Virtual Pad: choose a tool."); })) << said();
-  take_drill();
+  ASSERT_TRUE(plug_->plug_in());
+  ASSERT_TRUE(until([&] { return says("Virtual Pad: choose a tool."); })) << problem();
+  click_tool("drill");
   ToolPointer& pointer = view_->pointer();
   EXPECT_FALSE(pointer.on_bone());
 
@@ -82,56 +49,57 @@ TEST_F(PadTest, APadDrillsRumblesUndoesAndLetsGoWhenItIsUnplugged) {
   // upward, that is the patient's right, -x.
   PadState hand;
   hand.left.x() = 1.0;
-  plug_.hold(hand);
-  ASSERT_TRUE(until([&] { return pointer.on_bone(); })) << said();
+  plug_->hold(hand);
+  ASSERT_TRUE(until([&] { return pointer.on_bone(); })) << problem();
   const double from_x = pointer.input().target_mm.x();
-  ASSERT_TRUE(until([&] { return pointer.input().target_mm.x() < from_x - 3.0; })) << said();
-  plug_.hold({});
+  ASSERT_TRUE(until([&] { return pointer.input().target_mm.x() < from_x - 3.0; })) << problem();
+  plug_->hold({});
   EXPECT_TRUE(until([&] { return label("device") == "Game pad"; }));
   EXPECT_EQ(pointer.input().source, PointerSource::game_pad);
-  EXPECT_TRUE(plug_.quiet()) << "nothing is touched yet";
+  EXPECT_TRUE(plug_->quiet()) << "nothing is touched yet";
 
   // The trigger pushes as hard as it is pulled, and the motors follow the force.
   const double wheel_n = pointer.push_n();
   hand = {};
   hand.right_trigger = 0.8;
-  plug_.hold(hand);
-  ASSERT_TRUE(until([&] { return pointer.pushing(); })) << said();
+  plug_->hold(hand);
+  ASSERT_TRUE(until([&] { return pointer.pushing(); })) << problem();
   constexpr double kRest = PadControl::kTriggerRest;
   EXPECT_NEAR(pointer.push_n(), 1.0 + 39.0 * (0.8 - kRest) / (1.0 - kRest), 0.01);
-  ASSERT_TRUE(until([&] { return cut(); })) << said();
-  EXPECT_TRUE(until([&] { return !plug_.quiet(); }));
+  ASSERT_TRUE(until([&] { return cut(); })) << problem();
+  EXPECT_TRUE(until([&] { return !plug_->quiet(); }));
   // 30 N are the device's, so 20 N or more are √(2/3) of the motor.
-  EXPECT_TRUE(until(
-      [&] { return std::ranges::any_of(plug_.heard(), [](const auto& motors) { return motors.low > 0.8 * 65535; }); }));
+  EXPECT_TRUE(until([&] {
+    return std::ranges::any_of(plug_->heard(), [](const auto& motors) { return motors.low > 0.8 * 65535; });
+  }));
 
   // Let go, the tool comes out and the motors rest. The wheel's push is back.
-  plug_.hold({});
-  EXPECT_TRUE(until([&] { return !pointer.pushing() && plug_.quiet(); }));
+  plug_->hold({});
+  EXPECT_TRUE(until([&] { return !pointer.pushing() && plug_->quiet(); }));
   EXPECT_EQ(pointer.push_n(), wheel_n);
   hand = {};
   hand.b = true;
-  plug_.hold(hand);
-  EXPECT_TRUE(until([&] { return !cut(); })) << said();
-  plug_.hold({});
+  plug_->hold(hand);
+  EXPECT_TRUE(until([&] { return !cut(); })) << problem();
+  plug_->hold({});
 
   // A toggles the spindle.
   ASSERT_TRUE(pointer.spindle());
   hand = {};
   hand.a = true;
-  plug_.hold(hand);
+  plug_->hold(hand);
   EXPECT_TRUE(until([&] { return !pointer.spindle(); }));
-  plug_.hold({});
+  plug_->hold({});
 
   // Unplugged while it pushes.
   hand = {};
   hand.right_trigger = 1.0;
   QTest::qWait(100);
-  plug_.hold(hand);
-  ASSERT_TRUE(until([&] { return pointer.pushing() && pointer.push_n() > 39.9; })) << said();
-  plug_.unplug();
+  plug_->hold(hand);
+  ASSERT_TRUE(until([&] { return pointer.pushing() && pointer.push_n() > 39.9; })) << problem();
+  plug_->unplug();
   EXPECT_TRUE(until([&] { return !pointer.pushing(); }));
-  EXPECT_TRUE(says("Virtual Pad was unplugged and has let the tool go.")) << said();
+  EXPECT_TRUE(says("Virtual Pad was unplugged and has let the tool go.")) << problem();
   EXPECT_TRUE(until([&] { return label("device") == "Pointer"; }));
   EXPECT_EQ(pointer.push_n(), wheel_n);
 }

@@ -35,9 +35,7 @@
 #include <string>
 #include <vector>
 
-#include "tests/integration/desk.hpp"
-#include "viewer_client/desktop/bone_view.hpp"
-#include "viewer_client/desktop/main_window.hpp"
+#include "tests/integration/window_bench.hpp"
 #include "viewer_client/desktop/risk_gauge.hpp"
 #include "viewer_client/desktop/sound_dialog.hpp"
 #include "viewer_client/desktop/start_page.hpp"
@@ -47,139 +45,9 @@ namespace osteon {
 namespace {
 
 using namespace std::chrono_literals;
-using test::Desk;
+using test::children;
 
-constexpr auto kPatience = 60s;
-
-// The children of this process whose program has this name.
-std::vector<pid_t> children(const std::string& program) {
-  std::vector<pid_t> found;
-  for (const auto& task : std::filesystem::directory_iterator("/proc/self/task")) {
-    std::ifstream list(task.path() / "children");
-    for (pid_t pid = 0; list >> pid;) {
-      std::ifstream command("/proc/" + std::to_string(pid) + "/comm");
-      std::string name;
-      std::getline(command, name);
-      if (program.starts_with(name) && !name.empty()) found.push_back(pid);
-    }
-  }
-  return found;
-}
-
-class WindowTest : public testing::Test {
- protected:
-  static void SetUpTestSuite() {
-    desk_ = std::make_unique<Desk>();
-    // Only deploy/with-null-sink brings a sound server. Nobody listens in this folder.
-    if (!has_sound()) ::setenv("PULSE_SERVER", ("unix:" + (desk_->temp() / "nobody").string()).c_str(), 1);
-  }
-  static bool has_sound() { return std::getenv("OSTEON_TEST_SOUND") != nullptr; }
-  static void TearDownTestSuite() { desk_.reset(); }
-
-  void SetUp() override {
-    ASSERT_TRUE(desk_->stands()) << "Xvfb, of Debian's package xvfb, did not start";
-    window_ = std::make_unique<MainWindow>();
-    show();
-    view_ = window_->findChild<BoneView*>("bone");
-    ASSERT_NE(view_, nullptr);
-  }
-  void TearDown() override {
-    window_.reset();
-    EXPECT_TRUE(children("osteon-server").empty());
-    EXPECT_TRUE(children("osteon-haptic").empty());
-  }
-
-  // Without a window manager nothing moves the window, and nothing but this takes the keyboard's focus.
-  void show() {
-    window_->setGeometry(0, 0, 1280, 900);
-    window_->show();
-    window_->activateWindow();
-    ASSERT_TRUE(QTest::qWaitForWindowActive(window_.get(), 30000));
-    ASSERT_FALSE(window_->geometry().contains(QCursor::pos()));
-  }
-  template <class Condition>
-  [[nodiscard]] bool until(Condition condition, std::chrono::milliseconds patience = kPatience) {
-    const auto deadline = std::chrono::steady_clock::now() + patience;
-    while (!condition()) {
-      if (std::chrono::steady_clock::now() > deadline) return false;
-      QTest::qWait(20);
-    }
-    return true;
-  }
-  [[nodiscard]] QString label(const char* name) const {
-    const auto* found = window_->findChild<QLabel*>(name);
-    return found != nullptr ? found->text() : QString();
-  }
-  // Opens the block and looks at its upper side, z = 0, from above.
-  void open(const std::filesystem::path& session = {}) {
-    window_->practise(desk_->bone(), session);
-    ASSERT_TRUE(until([&] { return view_->surface_shown(); })) << problem();
-    view_->look_from(Vec3(0.05, -0.05, 1));
-    ASSERT_TRUE(until([&] { return label("device") == "Pointer"; })) << problem();
-    QTest::qWait(50);
-  }
-  [[nodiscard]] std::string problem() const {
-    return label("words").toStdString() + " / " + window_->statusBar()->currentMessage().toStdString() + " / bone " +
-           label("force_bone").toStdString() + ", spindle " + label("spindle").toStdString() + ", depth " +
-           label("depth").toStdString() + (view_->pointer().pushing() ? ", pushing" : ", not pushing") +
-           (view_->pointer().on_bone() ? ", on bone" : ", off bone") + " " + encode(view_->pointer().input()) + logs();
-  }
-  // What the programs of the newest session have written.
-  [[nodiscard]] static std::string logs() {
-    std::string text;
-    std::filesystem::path newest;
-    std::error_code ignored;
-    for (const auto& session : std::filesystem::directory_iterator(data_folder() / "sessions", ignored))
-      newest = std::max(newest, session.path());
-    for (const auto& log : std::filesystem::directory_iterator(newest / "logs", ignored)) {
-      std::stringstream content;
-      content << std::ifstream(log.path()).rdbuf();
-      text += "\n" + log.path().filename().string() + ":\n" + content.str();
-    }
-    return text;
-  }
-  void click_tool(const char* group) {
-    auto* button = window_->findChild<QToolButton*>(group);
-    ASSERT_NE(button, nullptr);
-    QTest::mouseClick(button, Qt::LeftButton);
-  }
-  [[nodiscard]] QPoint middle() const { return {view_->width() / 2, view_->height() / 2}; }
-  // The mouse, in pixels of the view. QTest's moves of a widget go through the screen's pointer, which comes late and
-  // knows no pressed buttons. Its events of a window go the way that the platform's go.
-  [[nodiscard]] QWindow* frame() const { return window_->windowHandle(); }
-  [[nodiscard]] QPoint in_frame(const QPoint& at) const { return view_->mapTo(window_.get(), at); }
-  void hover(const QPoint& at) {
-    QTest::mouseMove(frame(), in_frame(at + QPoint(1, 0)));
-    QTest::mouseMove(frame(), in_frame(at));
-  }
-  void press(const QPoint& at) { QTest::mousePress(frame(), Qt::LeftButton, {}, in_frame(at)); }
-  void release(const QPoint& at) { QTest::mouseRelease(frame(), Qt::LeftButton, {}, in_frame(at)); }
-  [[nodiscard]] bool cut() const {
-    const SceneUpdater* updater = view_->updater();
-    return updater != nullptr && updater->complete() && updater->surface().any_cut_face();
-  }
-  // Takes the drill and holds the button in the middle of the picture until bone goes.
-  void drill() {
-    click_tool("drill");
-    ASSERT_TRUE(until([&] {
-      hover(middle());
-      return view_->pointer().on_bone();
-    })) << problem();
-    press(middle());
-    EXPECT_TRUE(until([&] { return cut(); })) << problem();
-  }
-  void trigger(const char* action) {
-    auto* found = window_->findChild<QAction*>(action);
-    ASSERT_NE(found, nullptr);
-    ASSERT_TRUE(found->isEnabled()) << action;
-    found->trigger();
-  }
-
-  static std::unique_ptr<Desk> desk_;
-  std::unique_ptr<MainWindow> window_;
-  BoneView* view_ = nullptr;
-};
-std::unique_ptr<Desk> WindowTest::desk_;
+class WindowTest : public test::WindowBench {};
 
 TEST_F(WindowTest, AMouseDrillsTheBoneAndUndoBringsItBack) {
   open();

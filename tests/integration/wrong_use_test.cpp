@@ -7,18 +7,25 @@
 #include <sys/un.h>
 #include <unistd.h>
 
+#include <QAbstractButton>
 #include <QAction>
 #include <QApplication>
+#include <QDialog>
+#include <QDockWidget>
 #include <QLabel>
 #include <QListWidget>
 #include <QLocale>
+#include <QMenu>
+#include <QPointer>
 #include <QPushButton>
 #include <QSettings>
 #include <QStatusBar>
 #include <QTest>
+#include <QTimer>
 #include <QToolButton>
 #include <QWindow>
 #include <algorithm>
+#include <cerrno>
 #include <chrono>
 #include <cstdlib>
 #include <fstream>
@@ -33,39 +40,19 @@
 
 #include "common/volume/sparse_volume.hpp"
 #include "server/upload_validation/case_archive.hpp"
-#include "tests/integration/desk.hpp"
+#include "tests/integration/window_bench.hpp"
 #include "tests/support/failing/failing_writes.hpp"
 #include "tests/support/process.hpp"
-#include "viewer_client/desktop/bone_view.hpp"
 #include "viewer_client/desktop/language.hpp"
 #include "viewer_client/desktop/leftovers.hpp"
-#include "viewer_client/desktop/main_window.hpp"
 #include "viewer_client/desktop/sound_dialog.hpp"
 
 namespace osteon {
 namespace {
 
 using namespace std::chrono_literals;
-using test::Desk;
+using test::children;
 namespace fs = std::filesystem;
-
-constexpr auto kPatience = 60s;
-
-std::vector<pid_t> children_of(const std::string& process, const std::string& program) {
-  std::vector<pid_t> found;
-  std::error_code ignored;
-  for (const auto& task : fs::directory_iterator("/proc/" + process + "/task", ignored)) {
-    std::ifstream list(task.path() / "children");
-    for (pid_t pid = 0; list >> pid;) {
-      std::ifstream command("/proc/" + std::to_string(pid) + "/comm");
-      std::string name;
-      std::getline(command, name);
-      if (program.starts_with(name) && !name.empty()) found.push_back(pid);
-    }
-  }
-  return found;
-}
-std::vector<pid_t> children(const std::string& program) { return children_of("self", program); }
 
 // A zombie does not: whoever has to wait for it may never do so.
 bool lives(pid_t pid) {
@@ -146,71 +133,34 @@ class FullDisk {
   std::map<std::string, std::optional<std::string>> before_;
 };
 
-class WrongUse : public testing::Test {
- protected:
-  static void SetUpTestSuite() {
-    desk_ = std::make_unique<Desk>();
-    ::setenv("PULSE_SERVER", ("unix:" + (desk_->temp() / "nobody").string()).c_str(), 1);
+// Closes whatever waits for an answer, as Escape does.
+class Impatience : public QObject {
+ public:
+  Impatience() {
+    connect(&timer_, &QTimer::timeout, this, [this] {
+      if (QWidget* popup = QApplication::activePopupWidget()) popup->close();
+      if (auto* dialog = qobject_cast<QDialog*>(QApplication::activeModalWidget())) {
+        ++closed;
+        dialog->reject();
+      }
+    });
+    timer_.start(10);
   }
-  static void TearDownTestSuite() { desk_.reset(); }
+  int closed = 0;
 
+ private:
+  QTimer timer_;
+};
+
+class WrongUse : public test::WindowBench {
+ protected:
   void SetUp() override {
-    ASSERT_TRUE(desk_->stands()) << "Xvfb, of Debian's package xvfb, did not start";
     QSettings().setValue("tour/seen", true);
     speak("en");
-    begin();
+    WindowBench::SetUp();
   }
-  void TearDown() override {
-    window_.reset();
-    for (const char* program : {"osteon-server", "osteon-haptic", "osteon-audio", "osteon-import"})
-      EXPECT_TRUE(children(program).empty()) << program;
-  }
-
-  void begin() {
-    window_ = std::make_unique<MainWindow>();
-    window_->setGeometry(0, 0, 1280, 900);
-    window_->show();
-    window_->activateWindow();
-    ASSERT_TRUE(QTest::qWaitForWindowActive(window_.get(), 30000));
-    view_ = window_->findChild<BoneView*>("bone");
-  }
-  template <class Condition>
-  [[nodiscard]] bool until(Condition condition, std::chrono::milliseconds patience = kPatience) {
-    const auto deadline = std::chrono::steady_clock::now() + patience;
-    while (!condition()) {
-      if (std::chrono::steady_clock::now() > deadline) return false;
-      QTest::qWait(20);
-    }
-    return true;
-  }
-  [[nodiscard]] QString label(const char* name) const { return window_->findChild<QLabel*>(name)->text(); }
   // The whole sentence of the lower bar, which shows only its begin if it is long.
   [[nodiscard]] QString bar() const { return window_->statusBar()->toolTip(); }
-  [[nodiscard]] std::string problem() const { return (label("words") + " / " + bar()).toStdString(); }
-  void open(const fs::path& session = {}) {
-    window_->practise(desk_->bone(), session);
-    ASSERT_TRUE(until([&] { return view_->surface_shown() && label("device") == "Pointer"; })) << problem();
-    view_->look_from(Vec3(0.05, -0.05, 1));
-  }
-  [[nodiscard]] QPoint middle() const { return view_->mapTo(window_.get(), view_->rect().center()); }
-  void hover(const QPoint& at) {
-    QTest::mouseMove(window_->windowHandle(), at + QPoint(1, 0));
-    QTest::mouseMove(window_->windowHandle(), at);
-  }
-  void press(const QPoint& at) { QTest::mousePress(window_->windowHandle(), Qt::LeftButton, {}, at); }
-  void release(const QPoint& at) { QTest::mouseRelease(window_->windowHandle(), Qt::LeftButton, {}, at); }
-  [[nodiscard]] bool cut() const {
-    const SceneUpdater* updater = view_->updater();
-    return updater != nullptr && updater->complete() && updater->surface().any_cut_face();
-  }
-  void drill(const QPoint& at) {
-    window_->findChild<QToolButton*>("drill")->defaultAction()->trigger();
-    ASSERT_TRUE(until([&] {
-      hover(at);
-      return view_->pointer().on_bone();
-    })) << problem();
-    press(at);
-  }
   [[nodiscard]] bool at_start() const {
     return window_->findChild<QListWidget*>("examples")->isVisible() &&
            window_->findChild<QPushButton*>("open")->isEnabled();
@@ -231,12 +181,7 @@ class WrongUse : public testing::Test {
     const auto recent = recent_entries();
     return recent.empty() ? fs::path() : recent.front().session;
   }
-
-  static std::unique_ptr<Desk> desk_;
-  std::unique_ptr<MainWindow> window_;
-  BoneView* view_ = nullptr;
 };
-std::unique_ptr<Desk> WrongUse::desk_;
 
 void make_newer(const fs::path& folder) {
   std::string text = bytes_of(folder / "case.json");
@@ -326,7 +271,7 @@ TEST_F(WrongUse, ADiskThatFillsUpEndsTheSessionAndKeepsTheCut) {
   const fs::path folder = desk_->temp() / "session";
   const FullDisk disk((folder / "session.journal").string(), desk_->temp() / "control");
   open(folder);
-  drill(middle());
+  hold_drill();
   ASSERT_TRUE(until([&] { return cut(); })) << problem();
   QTest::qWait(300);
   disk.fill();
@@ -336,6 +281,76 @@ TEST_F(WrongUse, ADiskThatFillsUpEndsTheSessionAndKeepsTheCut) {
   disk.make_room();
   open(folder);
   EXPECT_TRUE(cut());
+}
+
+TEST_F(WrongUse, ADoubleClickOpensASessionOnce) {
+  open();
+  window_->close();
+  begin();
+  auto* list = window_->findChild<QListWidget*>("recent");
+  ASSERT_GE(list->count(), 1);
+  const QPoint at = list->visualItemRect(list->item(0)).center();
+  double_click(*list->viewport(), at);
+  ASSERT_TRUE(until([&] { return view_->surface_shown(); })) << problem();
+  EXPECT_EQ(children("osteon-server").size(), 1u);
+}
+
+TEST_F(WrongUse, DoubleClicksOnEverythingDoNoHarm) {
+  Impatience impatience;
+  // What one of them opens may be gone when the next one's turn comes.
+  const auto all_buttons_twice = [&] {
+    std::vector<QPointer<QAbstractButton>> buttons;
+    for (auto* button : window_->findChildren<QAbstractButton*>()) buttons.emplace_back(button);
+    for (const auto& button : buttons)
+      if (button && button->isVisible() && button->isEnabled()) double_click(*button, button->rect().center());
+  };
+  // On the start page, with what opens a dialog.
+  all_buttons_twice();
+  EXPECT_GE(impatience.closed, 3);
+  EXPECT_TRUE(at_start());
+  const auto all_twice = [&](const std::set<QString>& but) {
+    int count = 0;
+    std::vector<QPointer<QAction>> actions;
+    for (auto* action : window_->findChildren<QAction*>())
+      if (action->menu() == nullptr && !but.contains(action->objectName())) actions.emplace_back(action);
+    for (const auto& action : actions)
+      for (int time = 0; time < 2; ++time)
+        if (action && action->isEnabled() && action->isVisible()) {
+          action->trigger();
+          ++count;
+        }
+    return count;
+  };
+  const std::set<QString> ends{"quit", "start_page"};
+  all_twice(ends);
+  open();
+  EXPECT_GT(all_twice(ends), 100);
+  all_buttons_twice();
+  for (auto* dialog : window_->findChildren<QDialog*>()) dialog->close();
+  QTest::qWait(50);
+  EXPECT_EQ(children("osteon-server").size(), 1u);
+  // The window works on.
+  window_->activateWindow();
+  for (auto* panel : window_->findChildren<QDockWidget*>()) panel->hide();
+  hold_drill();
+  EXPECT_TRUE(until([&] { return cut(); })) << problem();
+  release(middle());
+  window_->findChild<QAction*>("start_page")->trigger();
+  window_->findChild<QAction*>("start_page")->trigger();
+  EXPECT_TRUE(at_start());
+  window_->findChild<QAction*>("quit")->trigger();
+  window_->findChild<QAction*>("quit")->trigger();
+  EXPECT_FALSE(window_->isVisible());
+  QSettings().remove("window");
+}
+
+TEST_F(WrongUse, ADoubleClickPlacesOnePin) {
+  open();
+  window_->findChild<QToolButton*>("pin")->defaultAction()->trigger();
+  double_click(middle());
+  ASSERT_TRUE(until([&] { return view_->updater()->items().size() == 1; })) << problem();
+  QTest::qWait(300);
+  EXPECT_EQ(view_->updater()->items().size(), 1u);
 }
 
 TEST_F(WrongUse, AWindowThatIsClosedWhileItSavesFinishesTheFile) {
@@ -373,7 +388,7 @@ TEST_F(WrongUse, TwoWindowsShareSettingsAndFilesAndNoSession) {
   window_->practise(desk_->bone(), theirs);
   EXPECT_EQ(refused(), "Another window has this session open. Close it there first.");
   EXPECT_TRUE(other.running());
-  EXPECT_EQ(children_of(std::to_string(other.pid()), "osteon-server").size(), 1u);
+  EXPECT_EQ(children("osteon-server", std::to_string(other.pid())).size(), 1u);
 
   // Both save to the same file at the same time: one of both is there as a whole.
   open(mine);
@@ -389,7 +404,7 @@ TEST_F(WrongUse, TwoWindowsShareSettingsAndFilesAndNoSession) {
   // Killed, it leaves no program behind, and its session can be gone on with here.
   std::vector<pid_t> orphans;
   for (const char* program : {"osteon-server", "osteon-haptic", "osteon-audio"})
-    for (const pid_t pid : children_of(std::to_string(other.pid()), program)) orphans.push_back(pid);
+    for (const pid_t pid : children(program, std::to_string(other.pid()))) orphans.push_back(pid);
   EXPECT_GE(orphans.size(), 2u);
   const fs::path socket = fs::path(std::getenv("XDG_RUNTIME_DIR")) / ("osteon-pointer-" + std::to_string(other.pid()));
   EXPECT_TRUE(fs::exists(socket));
@@ -523,11 +538,59 @@ TEST_F(WrongUse, AKilledAudioClientComesBackAndIsGivenUpInOneSentence) {
   EXPECT_TRUE(until([&] { return bar() == "There is no sound: osteon-audio was ended by force or crashed."; }))
       << problem();
   // Bone can be cut without sound, and whoever switches the sound on again gets it.
-  drill(middle());
+  hold_drill();
   EXPECT_TRUE(until([&] { return cut(); })) << problem();
   release(middle());
   for (int time = 0; time < 2; ++time) window_->findChild<QAction*>("sound")->trigger();
   EXPECT_TRUE(until([&] { return children("osteon-audio").size() == 1; })) << problem();
+}
+
+TEST_F(WrongUse, AServerThatIsKilledAgainAndAgainEndsTheRoomInOneSentence) {
+  open();
+  pid_t killed = 0;
+  for (int time = 0; time < 3; ++time) {
+    std::vector<pid_t> now;
+    // It must have said where it listens, or its end is a start that failed.
+    ASSERT_TRUE(until([&] {
+      now = children("osteon-server");
+      return now.size() == 1 && now[0] != killed && fs::exists(session() / "logs" / "address");
+    })) << problem();
+    ASSERT_EQ(::kill(killed = now[0], SIGKILL), 0);
+  }
+  EXPECT_EQ(refused(), "osteon-server was ended by force or crashed.");
+  const fs::path last = session();
+  open(last);
+}
+
+TEST_F(WrongUse, ARoomThatOthersRunGoesAndComesBack) {
+  // In a room to practise in. It ends, because the window is in one room only.
+  open();
+  test::Process server(test::program("osteon-server"), {"--case", desk_->bone().string(), "--plain", "--listen",
+                                                        "127.0.0.1:0", "--address-file", desk_->temp() / "address"});
+  ASSERT_TRUE(until([&] { return bytes_of(desk_->temp() / "address").ends_with('\n'); })) << server.err();
+  const QString address = QString::fromStdString(bytes_of(desk_->temp() / "address")).trimmed();
+  window_->join({address, {}, {}, {}});
+  EXPECT_TRUE(children("osteon-haptic").empty());
+  ASSERT_TRUE(until([&] { return view_->surface_shown(); })) << problem();
+  ASSERT_TRUE(until([&] { return label("connection") == "Connected to " + address; })) << problem();
+
+  server.signal(SIGKILL);
+  EXPECT_TRUE(until([&] { return label("connection") == "Connection lost, trying again"; })) << problem();
+  window_->findChild<QAction*>("undo")->trigger();
+  server = test::Process(test::program("osteon-server"),
+                         {"--case", desk_->bone().string(), "--plain", "--listen", address.toStdString()});
+  EXPECT_TRUE(until([&] { return label("connection") == "Connected to " + address; })) << problem();
+  EXPECT_EQ(server.terminate(), 0);
+
+  // Nobody is there. The page says so, and everything else can be begun meanwhile and afterwards.
+  window_->join({address, {}, {}, {}});
+  EXPECT_EQ(label("words"), "Joining the room at " + address);
+  EXPECT_FALSE(at_start());
+  window_->findChild<QPushButton*>("cancel")->click();
+  EXPECT_TRUE(at_start());
+  window_->join({address, {}, {}, {}});
+  EXPECT_TRUE(until([&] { return label("words").contains("nothing listens at"); })) << problem();
+  EXPECT_TRUE(at_start());
 }
 
 }  // namespace

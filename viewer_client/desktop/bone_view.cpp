@@ -278,6 +278,7 @@ void BoneView::resizeEvent(QResizeEvent* event) {
 
 void BoneView::mousePressEvent(QMouseEvent* event) {
   last_ = pressed_ = event->pos();
+  second_click_ = event->type() == QEvent::MouseButtonDblClick;
   if (pad_pushes_ && event->button() == Qt::LeftButton) return;  // two hands do not push at one tool
   camera_drag_ = event->button() == Qt::MiddleButton || !holding_;
   if (!holding_ || event->button() != Qt::LeftButton) return;
@@ -320,7 +321,9 @@ void BoneView::mouseReleaseEvent(QMouseEvent* event) {
     point_at(event->pos());
     pointer_moved();
   }
-  if (event->button() == Qt::LeftButton && placing_ && (event->pos() - pressed_).manhattanLength() <= kClick_px) {
+  // The second click of a double click is not for a second item in the same hole.
+  if (event->button() == Qt::LeftButton && placing_ && !second_click_ &&
+      (event->pos() - pressed_).manhattanLength() <= kClick_px) {
     const SightRay ray = sight(event->pos());
     const auto hit = updater_ ? updater_->surface().first_hit(ray.from_mm, ray.direction) : std::nullopt;
     if (hit && is_drawn(clipping_, hit->point_mm) && events_.clicked) events_.clicked(*hit);

@@ -120,10 +120,11 @@ class BoneView : public QVTKOpenGLNativeWidget {
   Box bounds_;
   ToolPointer pointer_;
   bool holding_ = false, placing_ = false;
-  bool follows_ = false;    // the camera is one that goes after the tool
-  bool following_ = false;  // it does so now
-  QPoint last_;             // position of the mouse, device pixels
-  QPoint pressed_;          // where a button went down
+  bool follows_ = false;       // the camera is one that goes after the tool
+  bool following_ = false;     // it does so now
+  QPoint last_;                // position of the mouse, device pixels
+  QPoint pressed_;             // where a button went down
+  bool second_click_ = false;  // the button that went down last made it a double click
   bool camera_drag_ = false;
   std::optional<double> wheel_push_n_;  // while a pen or a pad pushes: what the wheel has set
   bool pad_leads_ = false, pad_pushes_ = false, pad_fine_ = false;

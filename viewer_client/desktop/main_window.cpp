@@ -1,7 +1,6 @@
 #include "viewer_client/desktop/main_window.hpp"
 
 #include <QAction>
-#include <QApplication>
 #include <QCloseEvent>
 #include <QDateTime>
 #include <QDialog>
@@ -55,7 +54,6 @@ constexpr int kPointerPeriod_ms = 50;
 constexpr int kCapPeriod_ms = 16;
 constexpr int kMessage_ms = 8000;
 constexpr double kMostRiskLimit_mm = 50.0;
-constexpr double kSamePlace_mm = 1.0;
 constexpr const char* kFirstTool = "drill-3.2";
 
 // What changes the room, beside the tools.
@@ -536,12 +534,6 @@ void MainWindow::rest_other_hand() {
 
 void MainWindow::place_item(const SurfaceHit& hit) {
   if (placing_.empty()) return;
-  // The second click of a double click is not for a second item in the same hole.
-  const bool again = placed_mm_ && (*placed_mm_ - hit.point_mm).norm() < kSamePlace_mm &&
-                     !since_placed_.hasExpired(QApplication::doubleClickInterval());
-  if (again) return;
-  placed_mm_ = hit.point_mm;
-  since_placed_.start();
   ItemPlace where;
   where.point_mm = hit.point_mm;
   where.on_bone = true;

@@ -154,8 +154,6 @@ class MainWindow : public QMainWindow {
   bool watching_ = false;
   bool closes_when_saved_ = false;
   std::string placing_;  // the item that the next click places
-  std::optional<Vec3> placed_mm_;
-  QElapsedTimer since_placed_;
   QString address_, room_name_;
   QTimer gauge_timer_, pointer_timer_, cap_timer_;
   QElapsedTimer clock_, capped_;  // capped_: since the SpaceMouse was asked last
