@@ -188,7 +188,7 @@ void million_triangles(Viewed& viewed, int frames) {
   print("vtk_with_backs_ms", plain);
 }
 
-int run(int frames) {
+int measure(int frames) {
   // Room for both windows side by side, so that none hides the other.
   const auto screen = Xvfb::start("2560x720");
   if (!screen) {
@@ -214,5 +214,5 @@ int main(int argc, char** argv) {
     std::fprintf(stderr, "osteon-scene-bench: needs the number of frames\n");
     return 1;
   }
-  return osteon::test::run(frames);
+  return osteon::test::measure(frames);
 }

@@ -296,7 +296,7 @@ Findings look_at(DrawnBone& bone, const std::filesystem::path& pictures) {
   return found;
 }
 
-int run(const char* folder, const std::filesystem::path& pictures) {
+int measure(const char* folder, const std::filesystem::path& pictures) {
   const auto loaded = Case::load(folder);
   if (!loaded) {
     std::fprintf(stderr, "osteon-skull-pictures: %s\n", loaded.error().message.c_str());
@@ -332,5 +332,5 @@ int main(int argc, char** argv) {
     std::fprintf(stderr, "osteon-skull-pictures: needs a case's folder\n");
     return 1;
   }
-  return osteon::test::run(argv[1], argc > 2 ? argv[2] : "");
+  return osteon::test::measure(argv[1], argc > 2 ? argv[2] : "");
 }
