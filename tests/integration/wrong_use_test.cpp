@@ -2,7 +2,6 @@
 // programs. It never crashes, loses nothing, and says one sentence.
 #include <gtest/gtest.h>
 #include <signal.h>
-#include <sys/resource.h>
 #include <sys/socket.h>
 #include <sys/un.h>
 #include <unistd.h>
@@ -41,8 +40,10 @@
 #include "common/volume/sparse_volume.hpp"
 #include "server/upload_validation/case_archive.hpp"
 #include "tests/integration/window_bench.hpp"
+#include "tests/support/content.hpp"
 #include "tests/support/failing/failing_writes.hpp"
 #include "tests/support/process.hpp"
+#include "tests/support/size_limit.hpp"
 #include "viewer_client/desktop/language.hpp"
 #include "viewer_client/desktop/leftovers.hpp"
 #include "viewer_client/desktop/sound_dialog.hpp"
@@ -52,6 +53,8 @@ namespace {
 
 using namespace std::chrono_literals;
 using test::children;
+using test::content;
+using test::names_in;
 namespace fs = std::filesystem;
 
 // A zombie does not: whoever has to wait for it may never do so.
@@ -71,39 +74,7 @@ pid_t dead_pid() {
   return pid;
 }
 
-std::string bytes_of(const fs::path& file) {
-  std::stringstream content;
-  content << std::ifstream(file, std::ios::binary).rdbuf();
-  return content.str();
-}
 void put_bytes(const fs::path& file, const std::string& bytes) { std::ofstream(file, std::ios::binary) << bytes; }
-
-std::set<std::string> names_in(const fs::path& folder) {
-  std::set<std::string> names;
-  std::error_code ignored;
-  for (const auto& entry : fs::directory_iterator(folder, ignored)) names.insert(entry.path().filename().string());
-  return names;
-}
-
-// Files that this program writes end at a size, as if the disk were full. Children that run already do not notice.
-class SmallFiles {
- public:
-  explicit SmallFiles(rlim_t bytes) : handler_(::signal(SIGXFSZ, SIG_IGN)) {
-    ::getrlimit(RLIMIT_FSIZE, &before_);
-    const rlimit small{bytes, before_.rlim_max};
-    ::setrlimit(RLIMIT_FSIZE, &small);
-  }
-  ~SmallFiles() {
-    ::setrlimit(RLIMIT_FSIZE, &before_);
-    ::signal(SIGXFSZ, handler_);
-  }
-  SmallFiles(const SmallFiles&) = delete;
-  SmallFiles& operator=(const SmallFiles&) = delete;
-
- private:
-  rlimit before_{};
-  void (*handler_)(int);
-};
 
 // Writes of children that start from now on fail where the path begins so, as on a full disk.
 class FullDisk {
@@ -184,7 +155,7 @@ class WrongUse : public test::WindowBench {
 };
 
 void make_newer(const fs::path& folder) {
-  std::string text = bytes_of(folder / "case.json");
+  std::string text = content(folder / "case.json");
   const std::string key = "\"schema_version\": ";
   text.replace(text.find(key), key.size() + 1, key + "99");
   put_bytes(folder / "case.json", text);
@@ -209,7 +180,7 @@ TEST_F(WrongUse, FilesThatAreNoCaseAreRefused) {
   ASSERT_TRUE(pack_case(desk_->bone(), file("sound"), {}));
   ASSERT_TRUE(pack_case(newer, file("newer"), {}));
   ASSERT_TRUE(pack_case(empty, file("empty"), {}));
-  std::string bytes = bytes_of(file("sound"));
+  std::string bytes = content(file("sound"));
   put_bytes(file("half"), bytes.substr(0, bytes.size() / 2));
   for (std::size_t at = 0; (at = bytes.find("case.json")) != std::string::npos;) bytes.replace(at, 9, "../e.json");
   put_bytes(file("climbs"), bytes);
@@ -250,7 +221,7 @@ TEST_F(WrongUse, AFullDiskLeavesTheOldFileAndTheWork) {
   window_->save_case_file(QString::fromStdString(file.string()));
   ASSERT_TRUE(until([&] { return bar().contains("make room on the disk"); })) << problem();
   EXPECT_FALSE(bar().contains('\n'));
-  EXPECT_EQ(bytes_of(file), "what was there before");
+  EXPECT_EQ(content(file), "what was there before");
   EXPECT_EQ(names_in(folder), std::set<std::string>{"My block.osteon"});
   EXPECT_TRUE(view_->surface_shown());
   disk.make_room();
@@ -260,10 +231,10 @@ TEST_F(WrongUse, AFullDiskLeavesTheOldFileAndTheWork) {
 
   put_bytes(picture, "what was there before");
   {
-    const SmallFiles small(1000);
+    const test::SizeLimit small(1000);
     EXPECT_FALSE(view_->scene().save_png(picture));
   }
-  EXPECT_EQ(bytes_of(picture), "what was there before");
+  EXPECT_EQ(content(picture), "what was there before");
   EXPECT_EQ(names_in(folder), (std::set<std::string>{"My block.osteon", "picture.png"}));
 }
 
@@ -361,7 +332,7 @@ TEST_F(WrongUse, AWindowThatIsClosedWhileItSavesFinishesTheFile) {
   EXPECT_TRUE(window_->isVisible());
   EXPECT_TRUE(bar().startsWith("The window closes when")) << problem();
   EXPECT_TRUE(until([&] { return !window_->isVisible(); })) << problem();
-  const std::string saved = bytes_of(file);
+  const std::string saved = content(file);
   EXPECT_GT(saved.size(), 10000u);
   // Whoever closes it once more gives up the new file, and keeps the old one.
   put_bytes(file, "what was there before");
@@ -372,7 +343,7 @@ TEST_F(WrongUse, AWindowThatIsClosedWhileItSavesFinishesTheFile) {
   window_->close();
   EXPECT_FALSE(window_->isVisible());
   EXPECT_TRUE(children("osteon-import").empty());
-  EXPECT_TRUE(bytes_of(file) == "what was there before" || bytes_of(file) == saved);
+  EXPECT_TRUE(content(file) == "what was there before" || content(file) == saved);
   for (const std::string& name : names_in(file.parent_path())) EXPECT_EQ(name.find(".partial"), std::string::npos);
 }
 
@@ -567,8 +538,8 @@ TEST_F(WrongUse, ARoomThatOthersRunGoesAndComesBack) {
   open();
   test::Process server(test::program("osteon-server"), {"--case", desk_->bone().string(), "--plain", "--listen",
                                                         "127.0.0.1:0", "--address-file", desk_->temp() / "address"});
-  ASSERT_TRUE(until([&] { return bytes_of(desk_->temp() / "address").ends_with('\n'); })) << server.err();
-  const QString address = QString::fromStdString(bytes_of(desk_->temp() / "address")).trimmed();
+  ASSERT_TRUE(until([&] { return content(desk_->temp() / "address").ends_with('\n'); })) << server.err();
+  const QString address = QString::fromStdString(content(desk_->temp() / "address")).trimmed();
   window_->join({address, {}, {}, {}});
   EXPECT_TRUE(children("osteon-haptic").empty());
   ASSERT_TRUE(until([&] { return view_->surface_shown(); })) << problem();

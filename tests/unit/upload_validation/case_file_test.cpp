@@ -2,66 +2,33 @@
 #include "server/upload_validation/case_file.hpp"
 
 #include <gtest/gtest.h>
-#include <sys/resource.h>
 #include <sys/stat.h>
 
 #include <algorithm>
-#include <csignal>
 #include <cstdlib>
 #include <ctime>
 #include <fstream>
 #include <set>
-#include <sstream>
 #include <string>
 
 #include "common/volume/case.hpp"
 #include "common/volume/case_scan.hpp"
+#include "tests/support/content.hpp"
 #include "tests/support/privileges.hpp"
 #include "tests/support/process.hpp"
 #include "tests/support/scenes/described_case.hpp"
+#include "tests/support/size_limit.hpp"
 #include "tests/support/temp_dir.hpp"
 #include "tests/unit/upload_validation/zip_bytes.hpp"
 
 namespace osteon {
 namespace {
 
-std::string bytes_of(const std::filesystem::path& file) {
-  std::ostringstream out;
-  out << std::ifstream(file, std::ios::binary).rdbuf();
-  return out.str();
-}
-
 void put_bytes(const std::filesystem::path& file, const std::string& bytes) {
   std::ofstream(file, std::ios::binary) << bytes;
 }
 
-std::set<std::string> names_in(const std::filesystem::path& folder) {
-  std::set<std::string> names;
-  for (const auto& entry : std::filesystem::directory_iterator(folder)) names.insert(entry.path().filename().string());
-  return names;
-}
-
 bool go_on(double) { return true; }
-
-// Every file that this process writes ends at a size, as if the disk were full.
-class SmallFiles {
- public:
-  explicit SmallFiles(rlim_t bytes) : handler_(std::signal(SIGXFSZ, SIG_IGN)) {
-    ::getrlimit(RLIMIT_FSIZE, &before_);
-    const rlimit small{bytes, before_.rlim_max};
-    ::setrlimit(RLIMIT_FSIZE, &small);
-  }
-  ~SmallFiles() {
-    ::setrlimit(RLIMIT_FSIZE, &before_);
-    std::signal(SIGXFSZ, handler_);
-  }
-  SmallFiles(const SmallFiles&) = delete;
-  SmallFiles& operator=(const SmallFiles&) = delete;
-
- private:
-  rlimit before_{};
-  void (*handler_)(int);
-};
 
 class CaseFileTest : public ::testing::Test {
  protected:
@@ -90,12 +57,12 @@ class CaseFileTest : public ::testing::Test {
     EXPECT_NE(said.find(';'), std::string::npos) << said << "\nhas no remedy";
     EXPECT_EQ(said.find(".partial"), std::string::npos) << said;
     EXPECT_TRUE(std::ranges::none_of(said, [](char c) { return c >= 0 && c < ' '; })) << said;
-    EXPECT_EQ(names_in(temp_ / "out"), std::set<std::string>{}) << said;
+    EXPECT_EQ(test::names_in(temp_ / "out"), std::set<std::string>{}) << said;
   }
   // The case with one more entry, or another one of a name.
   [[nodiscard]] std::filesystem::path archive(const test::Entry& more, const char* options = nullptr) const {
-    const test::Bytes bytes = test::zip({{"case.json", bytes_of(temp_ / "case" / "case.json")},
-                                         {"bone.vdb", bytes_of(temp_ / "case" / "bone.vdb")},
+    const test::Bytes bytes = test::zip({{"case.json", test::content(temp_ / "case" / "case.json")},
+                                         {"bone.vdb", test::content(temp_ / "case" / "bone.vdb")},
                                          more},
                                         options);
     put_bytes(temp_ / "made.osteon", {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
@@ -129,7 +96,7 @@ TEST_F(CaseFileTest, WhatIsPackedComesOutAsTheSameCase) {
   ASSERT_TRUE(out) << out.error().message;
   EXPECT_EQ(last, 1.0);
   EXPECT_EQ(out->hash, hash_);
-  EXPECT_EQ(names_in(temp_ / "out"), std::set<std::string>{"case"});
+  EXPECT_EQ(test::names_in(temp_ / "out"), std::set<std::string>{"case"});
   const auto bone = Case::load(temp_ / "out" / "case");
   ASSERT_TRUE(bone) << bone.error().message;
   EXPECT_EQ(bone->hash(), hash_);
@@ -138,7 +105,7 @@ TEST_F(CaseFileTest, WhatIsPackedComesOutAsTheSameCase) {
   const auto described = describe_scan(*scan);
   ASSERT_TRUE(described);
   EXPECT_EQ(described->hash, scan_hash_);
-  EXPECT_EQ(names_in(temp_ / "out" / "case"), (std::set<std::string>{"bone.vdb", "case.json", "scan.vdb"}));
+  EXPECT_EQ(test::names_in(temp_ / "out" / "case"), (std::set<std::string>{"bone.vdb", "case.json", "scan.vdb"}));
 }
 
 TEST_F(CaseFileTest, ACaseWithoutItsScanIsOneToo) {
@@ -149,7 +116,7 @@ TEST_F(CaseFileTest, ACaseWithoutItsScanIsOneToo) {
 }
 
 TEST_F(CaseFileTest, TheSameFilesAreTheSameBytes) {
-  const std::string first = bytes_of(packed());
+  const std::string first = test::content(packed());
   using namespace std::chrono_literals;
   for (const char* file : {"case.json", "bone.vdb", "scan.vdb"}) {
     const std::filesystem::path path = temp_ / "case" / file;
@@ -162,7 +129,7 @@ TEST_F(CaseFileTest, TheSameFilesAreTheSameBytes) {
   for (const char* other : {"Pacific/Kiritimati", "Pacific/Pago_Pago"}) {  // a day apart
     ::setenv("TZ", other, 1);
     ::tzset();
-    EXPECT_EQ(bytes_of(packed()), first) << other;
+    EXPECT_EQ(test::content(packed()), first) << other;
   }
   zone != nullptr ? ::setenv("TZ", before.c_str(), 1) : ::unsetenv("TZ");
   ::tzset();
@@ -203,7 +170,7 @@ TEST_F(CaseFileTest, BombsStopAtTheLimits) {
 }
 
 TEST_F(CaseFileTest, WhatIsNoSoundCaseIsRefused) {
-  const std::string sound = bytes_of(packed());
+  const std::string sound = test::content(packed());
   const auto refused = [&](const char* name, const std::string& bytes, const std::string& why) {
     put_bytes(temp_ / name, bytes);
     expect_refused(temp_ / name, ErrorCode::invalid_input, why);
@@ -214,7 +181,8 @@ TEST_F(CaseFileTest, WhatIsNoSoundCaseIsRefused) {
   std::string changed = sound;
   changed[changed.find("bone.vdb") + 200] ^= 1;
   refused("changed.osteon", changed, "changed.osteon");
-  const std::string json = bytes_of(temp_ / "case" / "case.json"), vdb = bytes_of(temp_ / "case" / "bone.vdb");
+  const std::string json = test::content(temp_ / "case" / "case.json"),
+                    vdb = test::content(temp_ / "case" / "bone.vdb");
   const auto zipped = [](const std::vector<test::Entry>& entries) {
     const test::Bytes bytes = test::zip(entries);
     return std::string(reinterpret_cast<const char*>(bytes.data()), bytes.size());
@@ -229,7 +197,8 @@ TEST_F(CaseFileTest, WhatIsNoSoundCaseIsRefused) {
   other.hu[5] = static_cast<std::int16_t>(other.hu[5] + 1);
   ASSERT_TRUE(save_scan(temp_ / "other.vdb", other));
   refused("rescanned.osteon",
-          zipped({{"case.json", json}, {"bone.vdb", vdb}, {"scan.vdb", bytes_of(temp_ / "other.vdb")}}), "not sound");
+          zipped({{"case.json", json}, {"bone.vdb", vdb}, {"scan.vdb", test::content(temp_ / "other.vdb")}}),
+          "not sound");
 }
 
 TEST_F(CaseFileTest, FoldersMadeForACaseThatIsRefusedGo) {
@@ -239,10 +208,10 @@ TEST_F(CaseFileTest, FoldersMadeForACaseThatIsRefusedGo) {
                             case_file_quota(), go_on);
   };
   ASSERT_FALSE(into(temp_ / "empty.osteon"));
-  EXPECT_EQ(names_in(temp_ / "out"), std::set<std::string>{});
+  EXPECT_EQ(test::names_in(temp_ / "out"), std::set<std::string>{});
   const auto out = into(packed());
   ASSERT_TRUE(out) << out.error().message;
-  EXPECT_EQ(names_in(temp_ / "out" / "new" / "deep"), std::set<std::string>{"case"});
+  EXPECT_EQ(test::names_in(temp_ / "out" / "new" / "deep"), std::set<std::string>{"case"});
 }
 
 TEST_F(CaseFileTest, OnlyPlainFilesAreRead) {
@@ -254,34 +223,34 @@ TEST_F(CaseFileTest, OnlyPlainFilesAreRead) {
 
 TEST_F(CaseFileTest, WhoCancelsFindsNothing) {
   const std::filesystem::path file = packed();
-  const auto names = names_in(temp_.path());
+  const auto names = test::names_in(temp_.path());
   for (const double until : {0.0, 0.05, 0.5, 0.995}) {
     const auto stops = [until](double fraction) { return fraction < until; };
     const auto out = unpack(file, case_file_quota(), stops);
     ASSERT_FALSE(out) << until;
     EXPECT_EQ(out.error().code, ErrorCode::cancelled) << out.error().message;
-    EXPECT_EQ(names_in(temp_ / "out"), std::set<std::string>{});
+    EXPECT_EQ(test::names_in(temp_ / "out"), std::set<std::string>{});
     const auto again = pack_case_file(temp_ / "case", temp_ / "other.osteon", false, stops);
     ASSERT_FALSE(again) << until;
     EXPECT_EQ(again.error().code, ErrorCode::cancelled) << again.error().message;
-    EXPECT_EQ(names_in(temp_.path()), names);
+    EXPECT_EQ(test::names_in(temp_.path()), names);
   }
 }
 
 TEST_F(CaseFileTest, AFullDiskLeavesNothing) {
   const std::filesystem::path file = packed();
-  const auto names = names_in(temp_.path());
-  const SmallFiles small(1000);
+  const auto names = test::names_in(temp_.path());
+  const test::SizeLimit small(1000);
   const auto out = unpack(file);
   ASSERT_FALSE(out);
   EXPECT_EQ(out.error().code, ErrorCode::internal);
   EXPECT_NE(out.error().message.find("make room"), std::string::npos) << out.error().message;
-  EXPECT_EQ(names_in(temp_ / "out"), std::set<std::string>{});
+  EXPECT_EQ(test::names_in(temp_ / "out"), std::set<std::string>{});
   const auto again = pack_case_file(temp_ / "case", temp_ / "bone.osteon", true, go_on);
   ASSERT_FALSE(again);
   EXPECT_EQ(again.error().code, ErrorCode::internal);
   EXPECT_NE(again.error().message.find("make room"), std::string::npos) << again.error().message;
-  EXPECT_EQ(names_in(temp_.path()), names);
+  EXPECT_EQ(test::names_in(temp_.path()), names);
 }
 
 TEST_F(CaseFileTest, AFolderWhereNobodyMayWriteIsSaid) {
@@ -300,7 +269,7 @@ TEST_F(CaseFileTest, AFolderWhereNobodyMayWriteIsSaid) {
       EXPECT_EQ(said.find(".partial"), std::string::npos) << said;
     }
   }
-  EXPECT_EQ(names_in(closed), std::set<std::string>{});
+  EXPECT_EQ(test::names_in(closed), std::set<std::string>{});
 }
 
 TEST_F(CaseFileTest, NothingIsWrittenOverUnasked) {
@@ -309,18 +278,18 @@ TEST_F(CaseFileTest, NothingIsWrittenOverUnasked) {
   const auto kept = pack_case_file(temp_ / "case", temp_ / "letter.osteon", false, go_on);
   ASSERT_FALSE(kept);
   EXPECT_EQ(kept.error().code, ErrorCode::exists);
-  EXPECT_EQ(bytes_of(temp_ / "letter.osteon"), "dear");
+  EXPECT_EQ(test::content(temp_ / "letter.osteon"), "dear");
   EXPECT_TRUE(pack_case_file(temp_ / "case", temp_ / "letter.osteon", true, go_on));
-  EXPECT_EQ(bytes_of(temp_ / "letter.osteon"), bytes_of(file));
+  EXPECT_EQ(test::content(temp_ / "letter.osteon"), test::content(file));
   std::filesystem::create_directory(temp_ / "out" / "case");
   const auto out = unpack(file);
   ASSERT_FALSE(out);
   EXPECT_EQ(out.error().code, ErrorCode::exists);
-  EXPECT_EQ(names_in(temp_ / "out" / "case"), std::set<std::string>{});
+  EXPECT_EQ(test::names_in(temp_ / "out" / "case"), std::set<std::string>{});
 }
 
 TEST_F(CaseFileTest, ADamagedCaseIsNotPacked) {
-  std::string vdb = bytes_of(temp_ / "case" / "bone.vdb");
+  std::string vdb = test::content(temp_ / "case" / "bone.vdb");
   vdb[vdb.size() / 2] ^= 4;
   put_bytes(temp_ / "case" / "bone.vdb", vdb);
   EXPECT_FALSE(pack_case_file(temp_ / "case", temp_ / "bone.osteon", false, go_on));
@@ -361,7 +330,7 @@ TEST_F(CaseFileTest, TheCommandsPackAndUnpack) {
     EXPECT_TRUE(time == 0 || line == first_line);
     first_line = line;
   }
-  EXPECT_EQ(names_in(temp_ / "library").size(), 1u);
+  EXPECT_EQ(test::names_in(temp_ / "library").size(), 1u);
 
   const auto refused = [&](const std::vector<std::string>& arguments, const std::string& why) {
     const auto said = import(arguments);

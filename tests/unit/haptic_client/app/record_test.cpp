@@ -1,7 +1,6 @@
 // Tests what a recording contains, that it survives killed writers and full disks, and that Python reads it.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -14,6 +13,7 @@
 #include "haptic_client/device/recorded_device.hpp"
 #include "tests/support/process.hpp"
 #include "tests/support/scenes/random.hpp"
+#include "tests/support/size_limit.hpp"
 #include "tests/support/temp_dir.hpp"
 #include "tests/unit/haptic_client/bench.hpp"
 
@@ -608,32 +608,12 @@ TEST(Recording, CanBeReadWhileItGrows) {
   EXPECT_EQ(read.exit_code, 0) << read.err;
 }
 
-// Prevents writing beyond some size of a file, as on a full disk.
-class SizeLimit {
- public:
-  explicit SizeLimit(rlim_t bytes) {
-    getrlimit(RLIMIT_FSIZE, &before_);
-    rlimit limit = before_;
-    limit.rlim_cur = bytes;
-    setrlimit(RLIMIT_FSIZE, &limit);
-    handler_ = std::signal(SIGXFSZ, SIG_IGN);
-  }
-  ~SizeLimit() {
-    setrlimit(RLIMIT_FSIZE, &before_);
-    std::signal(SIGXFSZ, handler_);
-  }
-
- private:
-  rlimit before_{};
-  void (*handler_)(int) = nullptr;
-};
-
 TEST(Recording, AFullDiskIsSaidInASentenceAndLeavesWhatWasWritten) {
   for (const rlim_t bytes : {400'000u, 555'555u, 700'001u}) {
     const TempDir temp;
     std::uint64_t fitted = 0;
     {
-      const SizeLimit full(bytes);
+      const osteon::test::SizeLimit full(bytes);
       Result<RecordFile> recording = RecordFile::create(temp / "a.h5", info_of_a_session());
       ASSERT_TRUE(recording) << recording.error().message;
       Result<void> appended;
@@ -682,7 +662,7 @@ TEST(Recording, LeavesALittleOfTheDisk) {
 TEST(Recorder, EndsTheRecordingAndNothingElse) {
   const TempDir temp;
   Recorder recorder;
-  const SizeLimit full(500'000);
+  const osteon::test::SizeLimit full(500'000);
   ASSERT_TRUE(recorder.open(temp / "a.h5", info_of_a_session()));
   for (std::uint64_t i = 0; i < 10'000; ++i) recorder.push(row(i));
   const Recorder::Outcome outcome = recorder.finish({});
