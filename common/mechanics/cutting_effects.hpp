@@ -35,7 +35,7 @@ class Bluntness {
 // chips increase the torque, and the thrust to a smaller degree [A]. Nobody clears a drill for a bicortical hole, or
 // leaves it in for ten diameters of cortical bone.
 //
-// Irrigation keeps drills from clogging (Lee 2018). Nobody gives a rate. Here water takes a fixed share of the chips in
+// Irrigation keeps drills from clogging (Lee 2018). We found no rate. Here water takes a fixed share of the chips in
 // each moment: level' = filling - level / rinse_s [A]. So a drill that fills at a steady rate r stays at r · rinse_s.
 // The water reaches all flutes. That flatters deep holes, into which water from outside hardly comes.
 struct CloggingParams {
