@@ -2,6 +2,7 @@
 // Each message is one packet of JSON text. The newest message counts, so neither side ever waits.
 #pragma once
 #include <array>
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <string>
@@ -13,6 +14,8 @@
 
 namespace osteon {
 
+// A window that sends nothing for so long hangs. The hand then lets go, and pushes again only after a new press.
+inline constexpr std::chrono::milliseconds kPointerSilence{1000};
 inline constexpr double kLeastPush_n = 1.0, kMostPush_n = 40.0;
 
 // What leads the pointer.

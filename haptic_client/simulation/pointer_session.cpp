@@ -153,6 +153,7 @@ void PointerSession::begin_push() noexcept {
   pushed_from_mm_ = pointed_mm_ = command_.target_mm;
   hand_ = {HandMode::push, command_.target_mm, axis()};
   met_ = let_go_ = false;
+  deepest_mm_ = 0.0;
   enter(PointerPhase::pushes);
 }
 
@@ -166,13 +167,18 @@ void PointerSession::follow_across() noexcept {
   hand_.target_mm += limited(way - way.dot(hand_.axis) * hand_.axis, kAcross_mm_per_s * loop_.params().dt_s);
 }
 
-// The tool was in bone, is half out of it, and the resistance is gone. In marrow the tool is still in bone, so the hand
-// pushes on through it.
+// The tool was in bone, is half out of it, goes on, and the resistance is gone. In marrow the tool is still in bone, so
+// the hand pushes on through it. A tool that rebounds goes back.
 bool PointerSession::gave_way() noexcept {
   const double resists_n = -last_.coupling.force_n.dot(hand_.axis);
+  const double depth_mm = (last_.pose_bone_proxy.position_mm - pushed_from_mm_).dot(hand_.axis);
+  const bool deeper = depth_mm > deepest_mm_;
+  deepest_mm_ = std::max(deepest_mm_, depth_mm);
   constexpr double kIn = 0.8, kOut = 0.5;
+  // Where no patch is, the loop knows no bone: nothing has given way there.
+  if (last_.events & kUncovered) return false;
   if (last_.cutting.engaged > kIn && resists_n > 0.5 * command_.push_n) met_ = true;
-  return met_ && last_.cutting.engaged < kOut && resists_n < 0.5 * command_.push_n;
+  return met_ && deeper && last_.cutting.engaged < kOut && resists_n < 0.5 * command_.push_n;
 }
 
 void PointerSession::act(const Patch& patch, double dt_s, SurgeonOrder& order) noexcept {

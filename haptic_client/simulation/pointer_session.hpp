@@ -7,6 +7,7 @@
 #include <optional>
 #include <string>
 
+#include "common/input/pointer_link.hpp"
 #include "common/runtime/triple_buffer.hpp"
 #include "haptic_client/simulation/free_hand.hpp"
 #include "haptic_client/simulation/session.hpp"
@@ -65,6 +66,8 @@ class PointerSession final : public Session {
                    const std::vector<PlacedGuide>* room_guides = nullptr) noexcept override;
   [[nodiscard]] bool done() const noexcept override { return false; }
   [[nodiscard]] bool endless() const noexcept override { return true; }
+  // The pointer has the window's clock. The hand that it leads has not: a tick moves it by one period.
+  [[nodiscard]] bool simulated_time() const noexcept override { return true; }
   [[nodiscard]] HapticLoop& loop() noexcept override { return loop_; }
   [[nodiscard]] const ReadyPlan& plan() const noexcept override { return plan_; }
   [[nodiscard]] const std::vector<StepResult>& results() const noexcept override { return results_; }
@@ -72,7 +75,7 @@ class PointerSession final : public Session {
   [[nodiscard]] const HapticDevice& device() const noexcept override { return device_; }
   [[nodiscard]] PointerPhase phase() const noexcept { return phase_; }
   // Ticks in a row without a message, after which the pointer counts as silent.
-  static constexpr int kSilentTicks = 1000;
+  static constexpr int kSilentTicks = kPointerSilence / std::chrono::milliseconds(1);
 
  private:
   [[nodiscard]] bool silent() const noexcept { return ticks_since_message_ > kSilentTicks; }
@@ -110,6 +113,7 @@ class PointerSession final : public Session {
   int ticks_since_message_ = kSilentTicks + 1;
   Vec3 pushed_from_mm_ = Vec3::Zero();  // where the tip was when the push began
   Vec3 pointed_mm_ = Vec3::Zero();      // the pointer's target of the tick before
+  double deepest_mm_ = 0;               // of the tip along the axis since the push began
   bool met_ = false;                    // the tool has been in bone since the push began
   bool let_go_ = true;                  // the button was up since the last push
   double react_s_ = 0;

@@ -1,9 +1,12 @@
 // Irrigation and suction as a person uses them: keys, check boxes and the mouse of the window, with the real programs
 // as its children.
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <QAction>
 #include <QCheckBox>
+#include <QStatusBar>
+#include <QThread>
 
 #include "tests/integration/window_bench.hpp"
 
@@ -48,8 +51,7 @@ TEST_F(OtherHand, IsLedByKeysAndBoxesAndWashesTheChipsOut) {
 
   // Chips fill the flutes of a drill that cuts, and stay in one that stands in its hole.
   view_->setFocus();
-  press(middle());
-  ASSERT_TRUE(until([&] { return state().flutes_full > 0.1; })) << problem();
+  ASSERT_TRUE(push_until([&] { return state().flutes_full > 0.1; })) << problem();
   QTest::keyClick(view_, Qt::Key_Space);
   ASSERT_TRUE(until([&] { return state().spindle_rpm < 1.0; })) << problem();
   const double before = state().flutes_full;
@@ -60,6 +62,11 @@ TEST_F(OtherHand, IsLedByKeysAndBoxesAndWashesTheChipsOut) {
   // Water takes them.
   action->trigger();
   EXPECT_TRUE(until([&] { return state().flutes_full < 0.5 * before; })) << problem();
+
+  // A window that hangs holds no drill.
+  QThread::msleep(1500);
+  EXPECT_TRUE(until([&] { return !view_->pointer().pushing(); })) << problem();
+  EXPECT_THAT(window_->statusBar()->currentMessage().toStdString(), testing::HasSubstr("the hand let go"));
   release(middle());
 
   // Whoever leaves the room lets both go.

@@ -124,7 +124,7 @@ void WindowBench::hold_drill() {
 
 void WindowBench::drill() {
   hold_drill();
-  EXPECT_TRUE(until([&] { return cut(); })) << problem();
+  EXPECT_TRUE(push_until([&] { return cut(); })) << problem();
 }
 
 bool WindowBench::cut() const {

@@ -54,6 +54,15 @@ class WindowBench : public testing::Test {
   // The same until bone goes.
   void drill();
   [[nodiscard]] bool cut() const;
+  // Holds the button. The hand lets go when the picture stands still, as on a busy machine. A person presses again
+  // then.
+  template <class Condition>
+  [[nodiscard]] bool push_until(Condition condition) {
+    return until([&] {
+      if (!view_->pointer().pushing()) release(middle()), press(middle());
+      return condition();
+    });
+  }
   void trigger(const char* action);
 
   // The mouse, in pixels of the view. QTest's moves of a widget go through the screen's pointer, which comes late and

@@ -545,6 +545,11 @@ void MainWindow::place_item(const SurfaceHit& hit) {
 void MainWindow::send_pointer() {
   if (!pointer_) return;
   ToolPointer& pointer = view_->pointer();
+  if (pointer.pushing() && sent_.isValid() && sent_.hasExpired(kPointerSilence.count())) {
+    pointer.release();
+    say(tr("The picture stood still for a second, so the hand let go. Press again."));
+  }
+  sent_.start();
   if (spindle_->isChecked() != pointer.spindle()) spindle_->setChecked(pointer.spindle());
   if (std::abs(pointer.push_n() - properties_->chosen().push_n) >= 1.0) tour_->did(TourStep::strength);
   gauges_->show_push(pointer.push_n());

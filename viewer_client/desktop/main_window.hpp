@@ -156,7 +156,9 @@ class MainWindow : public QMainWindow {
   std::string placing_;  // the item that the next click places
   QString address_, room_name_;
   QTimer gauge_timer_, pointer_timer_, cap_timer_;
-  QElapsedTimer clock_, capped_;  // capped_: since the SpaceMouse was asked last
+  QElapsedTimer clock_;
+  QElapsedTimer capped_;  // since the SpaceMouse was asked last
+  QElapsedTimer sent_;    // since the hand heard of the pointer
   SpaceMouseWatch space_mouse_{[](const std::string&) {}};
   std::unique_ptr<PadHand> pad_;  // from the first room on
 };

@@ -66,6 +66,12 @@ SessionTick Bench::tick(int periods) {
   return last_;
 }
 
+SessionTick Bench::tick_without_patch() {
+  last_ = session_->tick(Patch{}, RoomLink::follows);
+  ++ticks_;
+  return last_;
+}
+
 void Bench::follow() {
   CutPiece piece;
   while (session_->loop().take_piece(piece)) {

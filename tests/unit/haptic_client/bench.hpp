@@ -38,6 +38,7 @@ class Bench {
   // Runs one tick of `dt_s`, `periods` ticks after the last. `after_tick` sees the result before replica and patches
   // are updated.
   SessionTick tick(int periods = 1);
+  SessionTick tick_without_patch();  // as when the first patch is late
   // Runs until the plan is done and every cut is acknowledged.
   void run(const std::function<void(const SessionTick&)>& after_tick = {});
   void follow();  // updates replica and patch, as their thread would

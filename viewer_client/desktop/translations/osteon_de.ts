@@ -859,6 +859,10 @@
         <source>A: spindle, B: undo; those at the shoulders: motions at a tenth</source>
         <translation>A: Spindel, B: rückgängig; Schultertasten: Bewegungen auf ein Zehntel</translation>
     </message>
+    <message>
+        <source>The picture stood still for a second, so the hand let go. Press again.</source>
+        <translation>Das Bild stand eine Sekunde still, darum hat die Hand losgelassen. Drücken Sie noch einmal.</translation>
+    </message>
 </context>
 <context>
     <name>PadHand</name>

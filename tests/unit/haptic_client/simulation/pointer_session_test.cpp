@@ -242,6 +242,29 @@ TEST_F(PointedHand, SilenceEndsPushAndSpindle) {
   EXPECT_GT(removed(), before);
 }
 
+// A patch that is late says nothing of the bone, so nothing has given way.
+TEST_F(PointedHand, PushesOnThroughTicksWithoutAPatch) {
+  begin();
+  run(1500);
+  press(3000);
+  ASSERT_EQ(phase(), PointerPhase::pushes);
+  for (int i = 0; i < 20; ++i) {
+    const SessionTick now = bench_->tick_without_patch();
+    EXPECT_TRUE(now.report.events & kUncovered);
+    EXPECT_EQ(phase(), PointerPhase::pushes);
+  }
+  const double before = removed();
+  run(2000);
+  EXPECT_EQ(phase(), PointerPhase::pushes);
+  EXPECT_GT(removed(), before);
+}
+
+// The worker then passes on no late ticks (HapticWorker.CountsLateTicksForADeviceButNotForASimulatedHand).
+TEST_F(PointedHand, HasNoTimeButItsTicks) {
+  begin();
+  EXPECT_TRUE(session_->simulated_time());
+}
+
 // A hand that has let go does not push again by itself, however long the button is held.
 TEST_F(PointedHand, LetsGoAtABreakthroughAndNotInMarrow) {
   begin();
