@@ -861,7 +861,7 @@
     </message>
     <message>
         <source>The picture stood still for a second, so the hand let go. Press again.</source>
-        <translation>Das Bild stand eine Sekunde still, darum hat die Hand losgelassen. Drücken Sie noch einmal.</translation>
+        <translation>Das Bild stand eine Sekunde still. Die Hand hat losgelassen. Drücken Sie neu.</translation>
     </message>
 </context>
 <context>
