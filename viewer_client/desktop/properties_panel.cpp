@@ -85,8 +85,10 @@ void PropertiesPanel::show_tool(const std::string& name) {
 }
 
 void PropertiesPanel::show_push(double push_n) {
+  const int value = static_cast<int>(push_n);
+  if (push_->value() == value) return;  // setValue() always paints, and Qt then puts the whole window together again
   showing_ = true;
-  push_->setValue(static_cast<int>(push_n));
+  push_->setValue(value);
   showing_ = false;
 }
 
