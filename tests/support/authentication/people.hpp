@@ -1,5 +1,5 @@
-// A certificate authority for one test, with a server, people and tickets. They are made by deploy/certs, as users make
-// them.
+// A certificate authority for one test, with a server, people and tickets. deploy/certs makes them, as for users. That
+// takes a second, so a process makes them once, and each test gets a copy.
 #pragma once
 #include <chrono>
 #include <filesystem>
@@ -14,10 +14,14 @@ namespace osteon::test {
 
 class People {
  public:
-  People();  // the server's names are 127.0.0.1 and localhost
+  // [test's thread, as all] The server's names are 127.0.0.1 and localhost. Two at once have different authorities.
+  People();
+  ~People();
+  People(const People&) = delete;
+  People& operator=(const People&) = delete;
 
-  [[nodiscard]] std::filesystem::path server() const { return dir_ / "certs" / "server"; }
-  [[nodiscard]] std::filesystem::path ticket_key() const { return dir_ / "certs" / "authority" / "tickets.key"; }
+  [[nodiscard]] std::filesystem::path server() const { return certificates() / "server"; }
+  [[nodiscard]] std::filesystem::path ticket_key() const { return authority() / "tickets.key"; }
   [[nodiscard]] std::filesystem::path folder() const { return dir_.path(); }
   // The folder of that person's certificate. It is made if it does not exist.
   [[nodiscard]] std::filesystem::path person(const std::string& name);
@@ -34,6 +38,12 @@ class People {
   [[nodiscard]] TicketKey key() const;
 
  private:
+  struct Made;
+  [[nodiscard]] static Made& take_made();
+  [[nodiscard]] std::filesystem::path certificates() const { return dir_ / "certs"; }
+  [[nodiscard]] std::filesystem::path authority() const { return certificates() / "authority"; }
+
+  Made& made_;
   TempDir dir_;
   int tickets_ = 0;
 };
