@@ -16,7 +16,7 @@
 namespace osteon::import {
 namespace {
 
-const int kScans = static_cast<int>(test::trials(2000));
+const int kScans = static_cast<int>(test::trials(2000, 200));
 // Most progress calls of one import. Each stands for a slice of a stage, or a hundredth of a second of the distance's
 // threads.
 constexpr int kMostQuestions = 20'000;
