@@ -134,7 +134,7 @@ TEST_P(CompressedForce, GivesNothingAway) {
   run.scene = static_cast<StabilityScene>(std::get<0>(GetParam()));
   run.choice = std::get<1>(GetParam());
   run.delay_ms = 100;
-  run.ticks = osteon::test::trials(200'000, 40'000);
+  run.ticks = osteon::test::trials(200'000, 20'000);
   const StabilityResult r = osteon::test::run_stability(run);
   std::printf(
       "  %s, %s: %lld ticks, %llu contacts, generated %.4f mJ, worst %.5f, of the hand alone %.5f, net %.1f, cutting "

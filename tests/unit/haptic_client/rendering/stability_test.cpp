@@ -1,6 +1,7 @@
 // A short run of what tests/perf measures over a million ticks. The coupling gives the hand no more energy than it got,
 // on devices with three and with six axes.
 #include "tests/support/stability/stability.hpp"
+#include "tests/support/trials.hpp"
 
 #include <gtest/gtest.h>
 
@@ -16,7 +17,7 @@ TEST_P(Stability, TheCouplingGivesNothingAway) {
   run.scene = static_cast<StabilityScene>(std::get<0>(GetParam()));
   run.delay_ms = std::get<1>(GetParam());
   run.six_axes = std::get<2>(GetParam());
-  run.ticks = 40'000;  // rig and hand, on a strong device and on a weak one
+  run.ticks = trials(40'000, 20'000);  // rig and hand, on a strong device and on a weak one
   const StabilityResult r = run_stability(run);
   std::printf(
       "  %s, %d ms: %llu contacts, generated %.4f mJ, worst %.5f, net %.1f, cutting %.1f; steps over %.3f N, still "
