@@ -152,7 +152,7 @@ void MainWindow::make_panels() {
       [this](const std::string& tool) { take_tool(tool); });
   dock(tr("Tool"), "tool_panel", properties_, Qt::RightDockWidgetArea);
   dock(tr("Gauges"), "gauges_panel", gauges_, Qt::RightDockWidgetArea);
-  dock(tr("Open the bone"), "clipping_panel", clipping_, Qt::RightDockWidgetArea)->hide();
+  dock(tr("Clipping"), "clipping_panel", clipping_, Qt::RightDockWidgetArea)->hide();
   QDockWidget* connections = dock(tr("Connections"), "connection_panel",
                                   new ConnectionPanel([this] { return this->connections(); }), Qt::RightDockWidgetArea);
   connections->hide();
@@ -547,7 +547,7 @@ void MainWindow::send_pointer() {
   ToolPointer& pointer = view_->pointer();
   if (pointer.pushing() && sent_.isValid() && sent_.hasExpired(kPointerSilence.count())) {
     pointer.release();
-    say(tr("The picture stood still for a second, so the hand let go. Press again."));
+    say(tr("The window was busy for a second, so the hand stopped pushing. Press again."));
   }
   sent_.start();
   if (spindle_->isChecked() != pointer.spindle()) spindle_->setChecked(pointer.spindle());

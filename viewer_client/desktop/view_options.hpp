@@ -30,7 +30,7 @@ class ViewOptions : public QObject {
 
   // The menu of what is drawn over the bone.
   [[nodiscard]] QMenu* overlays() const { return overlays_; }
-  // Kept views are of one bone.
+  // Saved views are of one bone.
   void show_bone(const QString& title);
 
  private:

@@ -628,8 +628,8 @@
         <translation>Das Zeigergerät fehlt</translation>
     </message>
     <message>
-        <source>Open the bone</source>
-        <translation>Knochen öffnen</translation>
+        <source>Clipping</source>
+        <translation>Schnittansicht</translation>
     </message>
     <message>
         <source>Save &amp;bone as…</source>
@@ -860,8 +860,8 @@
         <translation>A: Spindel, B: rückgängig; Schultertasten: Bewegungen auf ein Zehntel</translation>
     </message>
     <message>
-        <source>The picture stood still for a second, so the hand let go. Press again.</source>
-        <translation>Das Bild stand eine Sekunde still. Die Hand hat losgelassen. Drücken Sie neu.</translation>
+        <source>The window was busy for a second, so the hand stopped pushing. Press again.</source>
+        <translation>Das Fenster war eine Sekunde beschäftigt. Die Hand drückt nicht mehr. Drücken Sie neu.</translation>
     </message>
 </context>
 <context>
@@ -875,8 +875,8 @@
         <translation>%1: Wählen Sie ein Werkzeug. Linker Stick bewegt es, rechter Trigger drückt.</translation>
     </message>
     <message>
-        <source>%1 was unplugged and has let the tool go.</source>
-        <translation>%1 ist nicht mehr angeschlossen und hat das Werkzeug losgelassen.</translation>
+        <source>%1 was unplugged. It no longer leads the tool.</source>
+        <translation>%1 ist nicht mehr angeschlossen. Es führt das Werkzeug nicht mehr.</translation>
     </message>
 </context>
 <context>
@@ -1047,11 +1047,11 @@
         <translation>Es gibt keinen Ton: %1</translation>
     </message>
     <message>
-        <source>There is sound in a room to practise in. Open a bone first.</source>
-        <translation>Ton gibt es in einem Übungsraum. Öffnen Sie zuerst einen Knochen.</translation>
+        <source>Only a practice room has sound. Open a bone first.</source>
+        <translation>Ton gibt es nur in einem Übungsraum. Öffnen Sie zuerst einen Knochen.</translation>
     </message>
     <message>
-        <source>The audio client has not said anything yet.</source>
+        <source>The audio client has not reported yet.</source>
         <translation>Das Tonprogramm hat sich noch nicht gemeldet.</translation>
     </message>
     <message>
@@ -1394,24 +1394,24 @@
 <context>
     <name>ViewOptions</name>
     <message>
-        <source>Cube of the patient&apos;s sides</source>
-        <translation>Würfel mit den Seiten des Patienten</translation>
+        <source>Orientation cube</source>
+        <translation>Orientierungswürfel</translation>
     </message>
     <message>
         <source>Stereo picture</source>
         <translation>Stereobild</translation>
     </message>
     <message>
-        <source>Kept views</source>
-        <translation>Gemerkte Ansichten</translation>
+        <source>Saved views</source>
+        <translation>Gespeicherte Ansichten</translation>
     </message>
     <message>
-        <source>Keep this view</source>
-        <translation>Diese Ansicht merken</translation>
+        <source>Save this view</source>
+        <translation>Diese Ansicht speichern</translation>
     </message>
     <message>
-        <source>Forget the kept views</source>
-        <translation>Gemerkte Ansichten vergessen</translation>
+        <source>Delete the saved views</source>
+        <translation>Gespeicherte Ansichten löschen</translation>
     </message>
     <message>
         <source>View %1</source>
@@ -1438,12 +1438,12 @@
         <translation>Kein Quad-Buffer, deshalb ist Stereo aus. Wählen Sie Anaglyph oder Nebeneinander.</translation>
     </message>
     <message>
-        <source>Nine views are kept already. Forget them first.</source>
-        <translation>Neun Ansichten sind schon gemerkt. Vergessen Sie diese zuerst.</translation>
+        <source>Nine views are saved already. Delete them first.</source>
+        <translation>Neun Ansichten sind schon gespeichert. Löschen Sie diese zuerst.</translation>
     </message>
     <message>
-        <source>Kept as view %1.</source>
-        <translation>Als Ansicht %1 gemerkt.</translation>
+        <source>Saved as view %1.</source>
+        <translation>Als Ansicht %1 gespeichert.</translation>
     </message>
     <message>
         <source>Planned axes and regions</source>
