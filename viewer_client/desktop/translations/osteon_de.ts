@@ -861,7 +861,7 @@
     </message>
     <message>
         <source>The window was busy for a second, so the hand stopped pushing. Press again.</source>
-        <translation>Das Fenster war eine Sekunde beschäftigt. Die Hand drückt nicht mehr. Drücken Sie neu.</translation>
+        <translation>Das Fenster war eine Sekunde beschäftigt. Die Hand drückt nicht mehr. Neu drücken.</translation>
     </message>
 </context>
 <context>
