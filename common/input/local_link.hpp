@@ -51,7 +51,7 @@ class LocalServer {
                                                                    const LocalLinkNames& names);
   ~LocalServer();  // removes the socket
 
-  // Takes a client that waits, if there is none, and all that it said; `take` gets each message.
+  // Accepts a waiting client if none is connected, and receives its messages: `take` gets each one.
   void attend(const LinkMessageTaken& take);
   void send(const std::string& text);
   [[nodiscard]] bool connected() const { return static_cast<bool>(peer_); }
@@ -69,7 +69,7 @@ class LocalClient {
   // there), invalid_input (the path is too long).
   [[nodiscard]] static Result<std::unique_ptr<LocalClient>> connect(const std::filesystem::path& socket,
                                                                     const LocalLinkNames& names);
-  // Waits so long for a message; `take` gets each that is there.
+  // Waits at most so long for a message. `take` gets each one that has come.
   void wait(int milliseconds, const LinkMessageTaken& take);
   void send(const std::string& text);
   [[nodiscard]] bool closed() const { return !peer_; }  // the window has gone
@@ -95,7 +95,7 @@ class LocalMessageServer {
     attend();
     link_->send(encode(message));
   }
-  // What the client said last. None: it has said nothing yet, or has gone.
+  // The client's newest message. None: none has come yet, or no client is connected.
   [[nodiscard]] const std::optional<Incoming>& newest() {
     attend();
     return newest_;
@@ -104,7 +104,7 @@ class LocalMessageServer {
     attend();
     return link_->connected();
   }
-  // Since the newest message came. None: as of newest().
+  // Time since the newest message came. None: as of newest().
   [[nodiscard]] std::optional<std::chrono::duration<double, std::milli>> silence() const {
     if (!newest_) return std::nullopt;
     return std::chrono::steady_clock::now() - received_at_;
@@ -142,7 +142,7 @@ class LocalMessageClient {
     return std::unique_ptr<LocalMessageClient>(new LocalMessageClient(std::move(*link)));
   }
 
-  // The newest message that came within this time. None: none came.
+  // Waits at most so long. Returns the newest message. None: none came.
   [[nodiscard]] std::optional<Incoming> wait(int milliseconds) {
     std::optional<Incoming> newest;
     link_->wait(milliseconds, [&](std::string_view text) {

@@ -1,5 +1,5 @@
-// A local socket between a window and the audio client of the same user: how loud the sound is to be, and what is
-// played. Each message is one packet of JSON text. The newest message counts, so neither side ever waits.
+// A local socket between a window and the audio client of the same user. The window sends the volume, the client what
+// it plays. Each message is one packet of JSON text. The newest message counts, so neither side waits.
 #pragma once
 #include <cstddef>
 #include <string>
