@@ -1,5 +1,5 @@
 // The dialog of the practice room's sound: volume, on and off, and what is played. While it is open it shows the newest
-// wave form, or why there is no sound.
+// waveform, or why there is no sound.
 #pragma once
 #include <QCoreApplication>
 #include <QDialog>

@@ -20,7 +20,7 @@ struct PadOrder {
   Eigen::Vector2d slide = Eigen::Vector2d::Zero(), turn = Eigen::Vector2d::Zero();
   bool push = false, push_begins = false;  // the right trigger is pulled; since this tick
   double push_n = 0;                       // kLeastPush_n to kMostPush_n while `push`, else 0
-  bool fine = false;                       // motions at a tenth; slide and turn are not scaled by it
+  bool fine = false;                       // motion ten times smaller; slide and turn are not scaled by it
   std::optional<bool> spindle;             // the left trigger was pulled or let go in this tick
   bool toggles_spindle = false;            // A went down in this tick
   bool undoes = false;                     // B went down in this tick

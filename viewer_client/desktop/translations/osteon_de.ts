@@ -732,8 +732,8 @@
         <translation>Umschalt</translation>
     </message>
     <message>
-        <source>motions at a tenth</source>
-        <translation>ein Zehntel der Bewegung</translation>
+        <source>motion ten times smaller</source>
+        <translation>zehnmal kleinere Bewegungen</translation>
     </message>
     <message>
         <source>Space</source>
@@ -776,7 +776,7 @@
         <translation>Linke Taste und Rad bewegen die Ansicht</translation>
     </message>
     <message>
-        <source>&amp;Volume and wave form…</source>
+        <source>&amp;Volume and waveform…</source>
         <translation>&amp;Lautstärke und Wellenform…</translation>
     </message>
     <message>
@@ -856,8 +856,8 @@
         <translation>Tasten eines Gamepads</translation>
     </message>
     <message>
-        <source>A: spindle, B: undo; those at the shoulders: motions at a tenth</source>
-        <translation>A: Spindel, B: rückgängig; Schultertasten: Bewegungen auf ein Zehntel</translation>
+        <source>A: spindle, B: undo; shoulder buttons: motion ten times smaller</source>
+        <translation>A: Spindel, B: rückgängig; Schultertasten: zehnmal kleinere Bewegungen</translation>
     </message>
     <message>
         <source>The window was busy for a second, so the hand stopped pushing. Press again.</source>
@@ -918,8 +918,8 @@
         <translation>%1 wurde gewaltsam beendet oder ist abgestürzt.</translation>
     </message>
     <message>
-        <source>%1 ended without a word.</source>
-        <translation>%1 endete ohne ein Wort.</translation>
+        <source>%1 ended and gave no reason.</source>
+        <translation>%1 endete, ohne einen Grund zu nennen.</translation>
     </message>
     <message>
         <source>The audio client ended and starts again.</source>
@@ -953,7 +953,7 @@
         <translation>Zähne</translation>
     </message>
     <message>
-        <source>Feed per turn</source>
+        <source>Feed per revolution</source>
         <translation>Vorschub je Umdrehung</translation>
     </message>
     <message>
@@ -1090,8 +1090,8 @@
         <translation>Rechenzeit je Puffer</translation>
     </message>
     <message>
-        <source>From the tool to the ear, at most</source>
-        <translation>Vom Werkzeug zum Ohr, höchstens</translation>
+        <source>Latency from tool to ear, at most</source>
+        <translation>Latenz vom Werkzeug zum Ohr, höchstens</translation>
     </message>
     <message>
         <source>Gaps</source>
@@ -1461,7 +1461,7 @@
 <context>
     <name>WavePlot</name>
     <message>
-        <source>Wave form of the sound</source>
+        <source>Waveform of the sound</source>
         <translation>Wellenform des Tons</translation>
     </message>
     <message>
