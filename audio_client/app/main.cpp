@@ -15,7 +15,7 @@
 
 #include "audio_client/net/state_subscription.hpp"
 #include "audio_client/output/audio_output.hpp"
-#include "audio_client/output/kept_output.hpp"
+#include "audio_client/output/reconnecting_output.hpp"
 #include "audio_client/output/sound_engine.hpp"
 #include "audio_client/output/wav_recorder.hpp"
 #include "audio_client/synth/sound_scene.hpp"
@@ -67,7 +67,7 @@ class StateLog {
     return {};
   }
 
-  void drain(audio::SoundEngine& engine, const audio::KeptOutput& output) {
+  void drain(audio::SoundEngine& engine, const audio::ReconnectingOutput& output) {
     audio::Sounded sounded;
     while (engine.next_sounded(sounded)) {
       const auto delay = engine.latency() + output.latency();
@@ -92,8 +92,9 @@ class StateLog {
   DurationHistogram latency_;
 };
 
-nlohmann::json summary_of(const Options& options, const audio::SoundEngine& engine, const audio::KeptOutput& output,
-                          const StateLog& states, const std::optional<audio::WavRecorder>& recorder) {
+nlohmann::json summary_of(const Options& options, const audio::SoundEngine& engine,
+                          const audio::ReconnectingOutput& output, const StateLog& states,
+                          const std::optional<audio::WavRecorder>& recorder) {
   const double peak = engine.peak();
   nlohmann::json summary = {
       {"output", options.output},
@@ -136,9 +137,10 @@ class Window {
 
   [[nodiscard]] bool there() const { return link_ != nullptr; }
 
-  void attend(audio::SoundEngine& engine, const audio::KeptOutput& output, unsigned rate_hz) {
+  void attend(audio::SoundEngine& engine, const audio::ReconnectingOutput& output, unsigned rate_hz) {
     if (!link_) return;
-    if (const std::optional<SoundWish> wish = link_->wait(0)) engine.set_volume(wish->on ? wish->volume : 0.0);
+    if (const std::optional<SoundSettings> settings = link_->wait(0))
+      engine.set_volume(settings->on ? settings->volume : 0.0);
     if (output.trouble() != said_ && !output.trouble().empty()) log::warn("no sound", {{"why", output.trouble()}});
     said_ = output.trouble();
     if (Clock::now() - reported_ < kReport) return;
@@ -149,7 +151,7 @@ class Window {
  private:
   Window(std::unique_ptr<SoundClient> link, std::string device) : link_(std::move(link)), device_(std::move(device)) {}
 
-  [[nodiscard]] SoundReport report(audio::SoundEngine& engine, const audio::KeptOutput& output,
+  [[nodiscard]] SoundReport report(audio::SoundEngine& engine, const audio::ReconnectingOutput& output,
                                    unsigned rate_hz) const {
     using Milliseconds = std::chrono::duration<double, std::milli>;
     SoundReport report;
@@ -191,7 +193,7 @@ Result<void> run(const Options& options, const StopSignal& stop) {
   Result<Window> window = Window::connect(options);
   if (!window) return tl::unexpected(window.error());
   if (window->there()) engine.set_volume(0.0);  // until the window has said how loud
-  audio::KeptOutput output([&] { return audio::open_output(output_params, engine); });
+  audio::ReconnectingOutput output([&] { return audio::open_output(output_params, engine); });
   // With a window, a device that is missing is reported there, and looked for again.
   if (Result<void> opened = output.open(); !opened && !window->there()) return opened;
 
@@ -238,7 +240,7 @@ Result<void> run(const Options& options, const StopSignal& stop) {
       received_at.reset();
     }
     broken = watch->ended();
-    output.keep(Clock::now(), window->there());
+    output.maintain(Clock::now(), window->there());
     if (!window->there() && !output.trouble().empty()) broken = Error{ErrorCode::unavailable, output.trouble()};
   }
 
@@ -250,7 +252,7 @@ Result<void> run(const Options& options, const StopSignal& stop) {
   std::this_thread::sleep_for(2 * kPoll);
   while (!engine.silent() && output.trouble().empty() && Clock::now() < end) {
     std::this_thread::sleep_for(kPoll);
-    output.keep(Clock::now(), false);
+    output.maintain(Clock::now(), false);
   }
   output.stop();
   states.drain(engine, output);

@@ -53,13 +53,13 @@ double LinkMessage::number(const char* name, double least, double most) {
   return value;
 }
 
-bool LinkMessage::yes(const char* name) {
+bool LinkMessage::boolean(const char* name) {
   const json* field = find(name);
   if (field == nullptr || !field->is_boolean()) return wrong(name), false;
   return field->get<bool>();
 }
 
-bool LinkMessage::yes_if_given(const char* name) { return find(name) != nullptr && yes(name); }
+bool LinkMessage::optional_boolean(const char* name) { return find(name) != nullptr && boolean(name); }
 
 std::string LinkMessage::text(const char* name) {
   const json* field = find(name);

@@ -37,8 +37,8 @@ class LinkMessage {
   ~LinkMessage();
 
   double number(const char* name, double least, double most);
-  bool yes(const char* name);
-  bool yes_if_given(const char* name);  // of a field that older programs do not send; false without it
+  bool boolean(const char* name);
+  bool optional_boolean(const char* name);  // of a field that older programs do not send; false without it
   std::string text(const char* name);
   // The index of a text that is one of these.
   std::size_t choice(const char* name, std::span<const std::string_view> choices);

@@ -51,7 +51,7 @@ class LocalServer {
                                                                    const LocalLinkNames& names);
   ~LocalServer();  // removes the socket
 
-  // Takes a client that waits, if there is none, and all that it said; `take` gets each message.
+  // Accepts a waiting client if none is connected, and receives its messages: `take` gets each one.
   void attend(const LinkMessageTaken& take);
   void send(const std::string& text);
   [[nodiscard]] bool connected() const { return static_cast<bool>(peer_); }
@@ -69,7 +69,7 @@ class LocalClient {
   // there), invalid_input (the path is too long).
   [[nodiscard]] static Result<std::unique_ptr<LocalClient>> connect(const std::filesystem::path& socket,
                                                                     const LocalLinkNames& names);
-  // Waits so long for a message; `take` gets each that is there.
+  // Waits at most so long for a message. `take` gets each one that has come.
   void wait(int milliseconds, const LinkMessageTaken& take);
   void send(const std::string& text);
   [[nodiscard]] bool closed() const { return !peer_; }  // the window has gone
@@ -79,9 +79,9 @@ class LocalClient {
   LocalSocket peer_;
 };
 
-// The window's end, with messages: it says `Said`, written by encode(), and hears `Heard`. For one thread; no call
-// waits.
-template <class Said, class Heard, Result<Heard> (*kRead)(std::string_view), LocalLinkNames (*kNames)()>
+// The window's end, with messages: it sends `Outgoing`, as encode() writes it, and receives `Incoming`. For one thread;
+// no call waits.
+template <class Outgoing, class Incoming, Result<Incoming> (*kRead)(std::string_view), LocalLinkNames (*kNames)()>
 class LocalMessageServer {
  public:
   // Errors: those of LocalServer::listen().
@@ -91,12 +91,12 @@ class LocalMessageServer {
     return std::unique_ptr<LocalMessageServer>(new LocalMessageServer(std::move(*link)));
   }
 
-  void send(const Said& message) {
+  void send(const Outgoing& message) {
     attend();
     link_->send(encode(message));
   }
-  // What the client said last. None: it has said nothing yet, or has gone.
-  [[nodiscard]] const std::optional<Heard>& newest() {
+  // The client's newest message. None: none has come yet, or no client is connected.
+  [[nodiscard]] const std::optional<Incoming>& newest() {
     attend();
     return newest_;
   }
@@ -104,10 +104,10 @@ class LocalMessageServer {
     attend();
     return link_->connected();
   }
-  // Since the newest message came. None: as of newest().
+  // Time since the newest message came. None: as of newest().
   [[nodiscard]] std::optional<std::chrono::duration<double, std::milli>> silence() const {
     if (!newest_) return std::nullopt;
-    return std::chrono::steady_clock::now() - heard_at_;
+    return std::chrono::steady_clock::now() - received_at_;
   }
   [[nodiscard]] std::uint64_t refused() const { return refused_; }  // messages that could not be read
 
@@ -115,24 +115,24 @@ class LocalMessageServer {
   explicit LocalMessageServer(std::unique_ptr<LocalServer> link) : link_(std::move(link)) {}
   void attend() {
     link_->attend([this](std::string_view text) {
-      Result<Heard> message = kRead(text);
+      Result<Incoming> message = kRead(text);
       if (message)
         newest_ = std::move(*message);
       else
         ++refused_;
-      heard_at_ = std::chrono::steady_clock::now();
+      received_at_ = std::chrono::steady_clock::now();
     });
     if (!link_->connected()) newest_.reset();
   }
 
   std::unique_ptr<LocalServer> link_;
-  std::optional<Heard> newest_;
-  std::chrono::steady_clock::time_point heard_at_;
+  std::optional<Incoming> newest_;
+  std::chrono::steady_clock::time_point received_at_;
   std::uint64_t refused_ = 0;
 };
 
 // The client's end, with messages. For one thread.
-template <class Said, class Heard, Result<Heard> (*kRead)(std::string_view), LocalLinkNames (*kNames)()>
+template <class Outgoing, class Incoming, Result<Incoming> (*kRead)(std::string_view), LocalLinkNames (*kNames)()>
 class LocalMessageClient {
  public:
   // Errors: those of LocalClient::connect().
@@ -142,11 +142,11 @@ class LocalMessageClient {
     return std::unique_ptr<LocalMessageClient>(new LocalMessageClient(std::move(*link)));
   }
 
-  // The newest message that came within this time. None: none came.
-  [[nodiscard]] std::optional<Heard> wait(int milliseconds) {
-    std::optional<Heard> newest;
+  // Waits at most so long. Returns the newest message. None: none came.
+  [[nodiscard]] std::optional<Incoming> wait(int milliseconds) {
+    std::optional<Incoming> newest;
     link_->wait(milliseconds, [&](std::string_view text) {
-      Result<Heard> message = kRead(text);
+      Result<Incoming> message = kRead(text);
       if (message)
         newest = std::move(*message);
       else
@@ -154,7 +154,7 @@ class LocalMessageClient {
     });
     return newest;
   }
-  void send(const Said& message) { link_->send(encode(message)); }
+  void send(const Outgoing& message) { link_->send(encode(message)); }
   [[nodiscard]] bool closed() const { return link_->closed(); }     // the window has gone
   [[nodiscard]] std::uint64_t refused() const { return refused_; }  // messages that could not be read
 

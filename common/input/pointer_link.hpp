@@ -1,5 +1,5 @@
-// A local socket between a window and the haptic client of the same user: where the pointer is, and what the tool does.
-// Each message is one packet of JSON text. The newest message counts, so neither side ever waits.
+// A local socket between a window and the haptic client of the same user. The window sends where the pointer is, the
+// client what the tool does. Each message is one packet of JSON text. The newest message counts, so neither side waits.
 #pragma once
 #include <array>
 #include <chrono>
@@ -14,7 +14,7 @@
 
 namespace osteon {
 
-// A window that sends nothing for so long hangs. The hand then lets go, and pushes again only after a new press.
+// A window that sends nothing for so long counts as hung. The hand then stops, and pushes only after a new press.
 inline constexpr std::chrono::milliseconds kPointerSilence{1000};
 inline constexpr double kLeastPush_n = 1.0, kMostPush_n = 40.0;
 
@@ -31,8 +31,8 @@ struct PointerInput {
   Eigen::Quaterniond rotation_bone_tool = Eigen::Quaterniond::Identity();  // the hand pushes along the tool's +z
   bool on_bone = false;      // false: the pointer is not over bone; the tool is lifted off and waits
   bool push = false;         // the button is held
-  bool irrigation = false;   // of the other hand; a message without this field: off
-  bool suction = false;      // likewise
+  bool irrigation = false;   // of the other hand; off in a message without this field
+  bool suction = false;      // of the other hand; off in a message without this field
   double push_n = 10.0;      // kLeastPush_n to kMostPush_n
   bool fine = false;         // motions across the axis at a tenth, while the hand pushes
   double spindle = 0.0;      // share of the spindle's speed, 0 to 1
@@ -46,7 +46,7 @@ struct PointerInput {
 struct PointerOutput {
   Pose pose_bone_tool;
   Vec3 force_hand_n = Vec3::Zero(), force_bone_n = Vec3::Zero();  // what the hand gets, what the bone gives
-  double device_holds_n = 0;  // the most that the device holds for long; 0: not known
+  double device_holds_n = 0;  // the largest force that the device holds for long; 0: not known
   double push_n = 0;          // with which the hand pushes now
   double depth_mm = 0;        // of the tip along its axis since the push began
   bool pushing = false;       // false while the button is held: the hand has reacted to a breakthrough

@@ -18,8 +18,8 @@ constexpr LinkMessageNames kSoundMessage{"a sound's", "the sound", "osteon and o
 
 LocalLinkNames sound_link_names() { return {"the sound's socket", "an audio client"}; }
 
-std::string encode(const SoundWish& wish) {
-  return json{{"version", kLinkVersion}, {"volume", wish.volume}, {"on", wish.on}}.dump();
+std::string encode(const SoundSettings& settings) {
+  return json{{"version", kLinkVersion}, {"volume", settings.volume}, {"on", settings.on}}.dump();
 }
 
 std::string encode(const SoundReport& report) {
@@ -38,14 +38,14 @@ std::string encode(const SoundReport& report) {
       .dump(-1, ' ', false, json::error_handler_t::replace);
 }
 
-Result<SoundWish> read_sound_wish(std::string_view text) {
+Result<SoundSettings> read_sound_settings(std::string_view text) {
   Result<LinkMessage> fields = LinkMessage::read(text, kSoundMessage);
   if (!fields) return tl::unexpected(fields.error());
-  SoundWish wish;
-  wish.volume = fields->number("volume", 0.0, 1.0);
-  wish.on = fields->yes("on");
+  SoundSettings settings;
+  settings.volume = fields->number("volume", 0.0, 1.0);
+  settings.on = fields->boolean("on");
   if (const Result<void> read = fields->outcome(); !read) return tl::unexpected(read.error());
-  return wish;
+  return settings;
 }
 
 Result<SoundReport> read_sound_report(std::string_view text) {

@@ -1,5 +1,5 @@
-// A local socket between a window and the audio client of the same user: how loud the sound is to be, and what is
-// played. Each message is one packet of JSON text. The newest message counts, so neither side ever waits.
+// A local socket between a window and the audio client of the same user. The window sends the volume, the client what
+// it plays. Each message is one packet of JSON text. The newest message counts, so neither side waits.
 #pragma once
 #include <cstddef>
 #include <string>
@@ -15,10 +15,10 @@ inline constexpr std::size_t kMostWaveSamples = 512;
 inline constexpr int kFullScale = 32767;  // of a sample
 
 // From the window.
-struct SoundWish {
+struct SoundSettings {
   double volume = 1.0;  // factor of the amplitude, 0 to 1
   bool on = true;       // false: silent
-  friend bool operator==(const SoundWish&, const SoundWish&) = default;
+  friend bool operator==(const SoundSettings&, const SoundSettings&) = default;
 };
 
 // From the audio client.
@@ -38,15 +38,15 @@ struct SoundReport {
 // As text, and back. A text of more than 512 bytes is shortened, and of a longer wave the newest samples stay. Errors
 // of reading, invalid_input: another version; a field that is missing, of another type, not finite, out of its range,
 // or too long.
-[[nodiscard]] std::string encode(const SoundWish& wish);
+[[nodiscard]] std::string encode(const SoundSettings& settings);
 [[nodiscard]] std::string encode(const SoundReport& report);
-[[nodiscard]] Result<SoundWish> read_sound_wish(std::string_view text);
+[[nodiscard]] Result<SoundSettings> read_sound_settings(std::string_view text);
 [[nodiscard]] Result<SoundReport> read_sound_report(std::string_view text);
 
 [[nodiscard]] LocalLinkNames sound_link_names();
 
 // The window's end, and the audio client's.
-using SoundServer = LocalMessageServer<SoundWish, SoundReport, read_sound_report, sound_link_names>;
-using SoundClient = LocalMessageClient<SoundReport, SoundWish, read_sound_wish, sound_link_names>;
+using SoundServer = LocalMessageServer<SoundSettings, SoundReport, read_sound_report, sound_link_names>;
+using SoundClient = LocalMessageClient<SoundReport, SoundSettings, read_sound_settings, sound_link_names>;
 
 }  // namespace osteon

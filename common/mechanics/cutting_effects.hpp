@@ -1,6 +1,6 @@
 // Effects that a surgeon expects of real tools: bluntness, clogged flutes, the grab at breakthrough, a saw that binds,
-// a broach driven by blows. They are small state machines, stepped by what the tool did in a tick. Their sums do not
-// depend on the length of the tick. All [haptic]: no allocation, clock or random number.
+// a broach driven by blows. They are small state machines, stepped by what the tool did in a tick. What adds up over
+// many ticks does not depend on their length. All [haptic]: no allocation, clock or random number.
 //
 // Effects that resist (bluntness, clogging, binding, blows) change the law that the proxy solves. The grab pulls
 // actively. It belongs to the port of the motor's forces, which bounds it and stops it with the pedal.
@@ -35,9 +35,9 @@ class Bluntness {
 // chips increase the torque, and the thrust to a smaller degree [A]. Nobody clears a drill for a bicortical hole, or
 // leaves it in for ten diameters of cortical bone.
 //
-// Irrigation keeps drills from clogging (Lee 2018). We found no rate. Here water takes a fixed share of the chips in
-// each moment: level' = filling - level / rinse_s [A]. So a drill that fills at a steady rate r stays at r · rinse_s.
-// The water reaches all flutes. That flatters deep holes, into which water from outside hardly comes.
+// Irrigation keeps drills from clogging (Lee 2018). We found no rate. Here water removes chips at a rate proportional
+// to their level: level' = filling - level / rinse_s [A]. So at a steady filling rate r the level tends to r · rinse_s.
+// The model lets water reach all flutes. Real water hardly gets into a deep hole.
 struct CloggingParams {
   double capacity_diameters = 10.0;  // depth in cortical bone until they are full; softer bone gives fewer chips
   double cleared_diameters = 1.5;    // distance of withdrawal until full flutes are empty
@@ -165,7 +165,7 @@ class CuttingEffects {
   [[nodiscard]] FeedLaw felt(const FeedLaw& law) const noexcept;
   [[nodiscard]] double torque_nmm(double law_torque_nmm) const noexcept;
   void step(const EffectMoment& moment, double dt_s) noexcept;
-  // Called when the tool is picked up: clean and free, only its wear stays.
+  // Called when the hand takes the tool up: resets all effects but wear.
   void take_up() noexcept;
   // The pull of the grab at breakthrough, on the tool along the feed. Not bounded by what the user feels.
   [[nodiscard]] double pull_n() const noexcept { return drills_ ? grab_.pull_n(grab_params) : 0.0; }

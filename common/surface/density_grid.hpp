@@ -1,4 +1,4 @@
-// The density of a bone as viewers have it: in steps, and only where there is bone.
+// The density of a bone as viewers have it: rounded to steps, and only in leaves that contain bone.
 #pragma once
 #include <array>
 #include <cstdint>
@@ -9,7 +9,7 @@
 
 namespace osteon {
 
-inline constexpr double kDensityStep_g_cm3 = 0.01;  // of a sample; more than 2.55 g/cm³ is sent as that
+inline constexpr double kDensityStep_g_cm3 = 0.01;  // of a sample; a density above 2.55 g/cm³ becomes 2.55
 inline constexpr std::size_t kDensitySamples = 512;
 inline constexpr std::size_t kMostDensityLeaves = 20000;  // 10 MB
 

@@ -54,7 +54,7 @@ std::string text(const json& object, const char* field, const char* otherwise) {
   return object.at(field).get<std::string>();
 }
 
-bool yes(const json& object, const char* field) {
+bool flag(const json& object, const char* field) {
   if (!object.contains(field)) return false;
   if (!object.at(field).is_boolean()) throw Wrong(std::string("\"") + field + "\" must be true or false");
   return object.at(field).get<bool>();
@@ -181,8 +181,8 @@ PlanStep read_step(const json& object) {
     step.window_v_mm = window[1];
   }
   step.tremor_mm = number(object, "tremor_mm", 0.0, 0.0, 5.0);
-  step.irrigation = yes(object, "irrigation");
-  step.suction = yes(object, "suction");
+  step.irrigation = flag(object, "irrigation");
+  step.suction = flag(object, "suction");
   if (object.contains("guide")) {
     if (!object.at("guide").is_boolean() || !drill)
       throw Wrong("\"guide\" must be true or false, and belongs to a drill");

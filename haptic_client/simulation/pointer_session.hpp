@@ -1,7 +1,6 @@
-// A hand that a pointer leads: a mouse or a pen over a picture of the bone. The pointer says where the tool rests and
-// when the hand pushes. A simulated hand (Hand, common/mechanics) does it, with its mass, damper and reaction time. So
-// a drill that breaks through plunges as in the hand of a simulated surgeon. One call is one tick; the caller gives
-// time.
+// A simulated hand that a pointer leads: a mouse, pen or game pad over a picture of the bone. The pointer says where
+// the tool rests and when the hand pushes. The hand (Hand, common/mechanics) has mass, damper and reaction time. So a
+// drill that breaks through plunges as in the hand of a simulated surgeon. One call is one tick.
 #pragma once
 #include <cstdint>
 #include <optional>
@@ -16,7 +15,7 @@ namespace osteon::haptic {
 
 // What the pointer wants; bone frame. As PointerInput of common/input/pointer_link.hpp, without text.
 struct PointerCommand {
-  std::uint64_t number = 0;  // of the message; a new number says that the window lives
+  std::uint64_t number = 0;  // of the message; a new number shows that the window runs
   Vec3 target_mm = Vec3::Zero();
   Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();
   bool on_bone = false, push = false, fine = false;
@@ -30,7 +29,7 @@ struct PointerState {
   Pose pose_bone_tool;
   Vec3 force_hand_n = Vec3::Zero(), force_bone_n = Vec3::Zero();
   double push_n = 0, depth_mm = 0;
-  double device_holds_n = 0;  // the most that the device holds for long
+  double device_holds_n = 0;  // the largest force that the device holds for long
   bool pushing = false, on_metal = false, saturated = false;
   int tool = 0;
 };
@@ -51,7 +50,7 @@ enum class PointerPhase : std::uint8_t {
   over,      // the hand brings the tool to where the pointer is
   rests,     // the tool's tip is where the pointer meets the bone
   pushes,    // the button is held
-  reacts,    // the bone gave way: the hand lets the push go
+  reacts,    // breakthrough: the hand reacts and stops pushing
   withdraws  // the button is up: the tool comes back along its axis
 };
 
@@ -66,7 +65,7 @@ class PointerSession final : public Session {
                    const std::vector<PlacedGuide>* room_guides = nullptr) noexcept override;
   [[nodiscard]] bool done() const noexcept override { return false; }
   [[nodiscard]] bool endless() const noexcept override { return true; }
-  // The pointer has the window's clock. The hand that it leads has not: a tick moves it by one period.
+  // The pointer follows the window's clock. The hand follows the ticks: each one moves it by one period.
   [[nodiscard]] bool simulated_time() const noexcept override { return true; }
   [[nodiscard]] HapticLoop& loop() noexcept override { return loop_; }
   [[nodiscard]] const ReadyPlan& plan() const noexcept override { return plan_; }
@@ -89,7 +88,7 @@ class PointerSession final : public Session {
   [[nodiscard]] std::optional<double> clear_mm(const Patch& patch) noexcept;
   void begin_push() noexcept;
   void follow_across() noexcept;
-  // The tip goes along a line to a point, at most this fast. True: it is there.
+  // Moves the tip along a line to a point, at most this fast. True: it is there.
   bool carry(const Vec3& to_mm, double speed_mm_per_s, double dt_s) noexcept;
   [[nodiscard]] bool gave_way() noexcept;
   void enter(PointerPhase phase) noexcept;

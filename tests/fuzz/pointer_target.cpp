@@ -50,12 +50,12 @@ void check_report(const SoundReport& report) {
 
 void read_sound_message(std::span<const std::uint8_t> data) {
   const std::string_view text(reinterpret_cast<const char*>(data.data()), data.size());
-  if (const Result<SoundWish> wish = read_sound_wish(text)) {
-    OSTEON_CHECK(within(wish->volume, 0.0, 1.0));
-    const Result<SoundWish> again = read_sound_wish(encode(*wish));
-    OSTEON_CHECK(again && *again == *wish);
+  if (const Result<SoundSettings> settings = read_sound_settings(text)) {
+    OSTEON_CHECK(within(settings->volume, 0.0, 1.0));
+    const Result<SoundSettings> again = read_sound_settings(encode(*settings));
+    OSTEON_CHECK(again && *again == *settings);
   } else {
-    expect_bounded(wish.error());
+    expect_bounded(settings.error());
   }
   if (const Result<SoundReport> report = read_sound_report(text))
     check_report(*report);
@@ -107,7 +107,7 @@ Target sound_message_target() {
   Target target{
       "sound_message",
       read_sound_message,
-      {bytes_of_text(encode(SoundWish{})), bytes_of_text(encode(SoundReport{})), bytes_of_text(encode(report))}};
+      {bytes_of_text(encode(SoundSettings{})), bytes_of_text(encode(SoundReport{})), bytes_of_text(encode(report))}};
   target.change = change_number;
   return target;
 }

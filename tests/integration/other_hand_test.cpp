@@ -28,7 +28,7 @@ class OtherHand : public test::WindowBench {
   [[nodiscard]] const CuttingState& state() const { return view_->updater()->states().front(); }
 };
 
-// One session for all, because each window starts a server and two clients. What the lower bar says has gone to the
+// One session for all, because each window starts a server and two clients. What the status bar says has gone to the
 // haptic client, to the room and back.
 TEST_F(OtherHand, IsLedByKeysAndBoxesAndWashesTheChipsOut) {
   auto* box = window_->findChild<QCheckBox*>("irrigation_box");

@@ -99,7 +99,7 @@ TEST_F(PadTest, APadDrillsRumblesUndoesAndLetsGoWhenItIsUnplugged) {
   ASSERT_TRUE(until([&] { return pointer.pushing() && pointer.push_n() > 39.9; })) << problem();
   plug_->unplug();
   EXPECT_TRUE(until([&] { return !pointer.pushing(); }));
-  EXPECT_TRUE(says("Virtual Pad was unplugged and has let the tool go.")) << problem();
+  EXPECT_TRUE(says("Virtual Pad was unplugged. It no longer leads the tool.")) << problem();
   EXPECT_TRUE(until([&] { return label("device") == "Pointer"; }));
   EXPECT_EQ(pointer.push_n(), wheel_n);
 }

@@ -270,7 +270,7 @@ TEST_F(WindowTest, AnOpenedBoneIsPointedAtWhereItIsSeen) {
   panel->hide();  // the next window opens as this one was left
 }
 
-// A tibia with an artery. The lower bar names what is nearest to the tip, and warns below the chosen distance.
+// A tibia with an artery. The status bar names what is nearest to the tip, and warns below the chosen distance.
 TEST_F(WindowTest, TheNearestStructureAtRiskIsNamedWithItsDistance) {
   window_->practise(desk_->tibia());
   ASSERT_TRUE(until([&] { return view_->surface_shown() && view_->updater()->plan(); })) << problem();

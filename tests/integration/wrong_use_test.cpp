@@ -130,7 +130,7 @@ class WrongUse : public test::WindowBench {
     speak("en");
     WindowBench::SetUp();
   }
-  // The whole sentence of the lower bar, which shows only its begin if it is long.
+  // The whole sentence of the status bar, which shows only its begin if it is long.
   [[nodiscard]] QString bar() const { return window_->statusBar()->toolTip(); }
   [[nodiscard]] bool at_start() const {
     return window_->findChild<QListWidget*>("examples")->isVisible() &&

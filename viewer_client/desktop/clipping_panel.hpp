@@ -1,4 +1,4 @@
-// Opens the bone in the picture: by a box, whose sides move inwards, and by a plane across the line of sight. Only the
+// Clips the bone in the picture: by a box, whose sides move inwards, and by a plane across the line of sight. Only the
 // picture changes.
 #pragma once
 #include <QCoreApplication>

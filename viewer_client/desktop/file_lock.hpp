@@ -1,24 +1,25 @@
-// A lock among the windows of one user.
+// A lock on a file, by which the windows of one user exclude each other.
 #pragma once
 #include <filesystem>
 
 namespace osteon {
 
-// The kernel releases it when its holder ends, however that happens. Two locks of one program exclude each other too.
+// The kernel releases the lock when its holder ends, also by a crash. Two objects in one program exclude each other
+// too.
 class FileLock {
  public:
-  // The file is made if it is missing, and stays. Its folder must be there.
+  // Makes the file if it is missing, and never removes it. Its folder must exist.
   explicit FileLock(const std::filesystem::path& file);
   ~FileLock();
   FileLock(const FileLock&) = delete;
   FileLock& operator=(const FileLock&) = delete;
 
-  // False: the file cannot be made, as on a disk that may only be read. Then no lock is ever held.
+  // False: the file cannot be opened or made, as on a read-only disk. Then this object never holds the lock.
   [[nodiscard]] bool usable() const { return fd_ >= 0; }
-  // Each gives up what this object held before. Returns whether it holds the lock now.
-  bool try_alone();    // false: another holds it
-  bool wait_alone();   // until all others have given it up
-  bool wait_shared();  // until nobody holds it alone
+  // Each call replaces the lock that this object held before. Returns whether the object holds the lock now.
+  bool try_alone();    // exclusive; false: another object holds the lock
+  bool wait_alone();   // exclusive; waits until all others have released it
+  bool wait_shared();  // shared; waits until nobody holds it exclusively
 
  private:
   bool take(int how) const;

@@ -1,5 +1,5 @@
-// What the tool does, in numbers and as a plot of the last seconds: force that the hand gets and that the bone gives,
-// depth, spindle, feed, removed volume. And how much of the hand's force the device can hold.
+// The gauges of the tool: push, force of the bone and on the hand, torque, depth, spindle, feed, density and flutes. A
+// plot shows both forces over the last ten seconds, and a bar how much of what the device holds the hand gets.
 #pragma once
 #include <QCoreApplication>
 #include <QWidget>
@@ -20,7 +20,7 @@ class ScrollingPlot : public QWidget {
 
  public:
   explicit ScrollingPlot(QWidget* parent = nullptr);
-  // `at_s`: on any steady clock. The plot is not drawn again while both lines are level.
+  // `at_s`: on any steady clock. While both lines are level, the plot is not drawn again.
   void add(double at_s, double first, double second);
   [[nodiscard]] QSize sizeHint() const override { return {240, 110}; }
 
@@ -43,7 +43,8 @@ struct HandForce {
   bool saturated = false;         // the device cannot hold what it should show
 };
 
-// `output`: what the window's own pointer reported last. None: the state's device is another.
+// `output`: the newest report of the window's own pointer. None: another device holds the tool, and `state` tells of
+// it. Returns none if that device's limit is not known.
 [[nodiscard]] std::optional<HandForce> hand_force(const CuttingState& state,
                                                   const std::optional<PointerOutput>& output);
 
@@ -53,14 +54,14 @@ class GaugesPanel : public QWidget {
  public:
   explicit GaugesPanel(QWidget* parent = nullptr);
 
-  // `pointer`: what its haptic client reported last. None: the tool is held at another device.
+  // `pointer`: the newest report of the window's own pointer. None: another device holds the tool.
   void show(const CuttingState& state, const std::optional<PointerOutput>& pointer, double at_s);
   void show_push(double push_n);
 
  private:
   void show_budget(const std::optional<HandForce>& hand);
   QLabel *bone_, *hand_, *torque_, *depth_, *spindle_, *feed_, *density_, *flutes_, *push_;
-  QProgressBar* budget_;  // the force on the hand, of what the device holds for long
+  QProgressBar* budget_;  // force on the hand as a share of what the device holds for long
   QLabel *budget_words_, *saturated_;
   ScrollingPlot* plot_;
 };

@@ -8,7 +8,7 @@
 
 namespace osteon {
 
-// Lives as long as a window. The last window to close, and the first to open, clears up.
+// Each window has one, as long as it is open. The first window to open and the last one to close remove the leftovers.
 class Leftovers {
  public:
   // `sockets`: the folder of the windows' sockets.

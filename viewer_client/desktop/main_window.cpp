@@ -152,7 +152,7 @@ void MainWindow::make_panels() {
       [this](const std::string& tool) { take_tool(tool); });
   dock(tr("Tool"), "tool_panel", properties_, Qt::RightDockWidgetArea);
   dock(tr("Gauges"), "gauges_panel", gauges_, Qt::RightDockWidgetArea);
-  dock(tr("Open the bone"), "clipping_panel", clipping_, Qt::RightDockWidgetArea)->hide();
+  dock(tr("Clipping"), "clipping_panel", clipping_, Qt::RightDockWidgetArea)->hide();
   QDockWidget* connections = dock(tr("Connections"), "connection_panel",
                                   new ConnectionPanel([this] { return this->connections(); }), Qt::RightDockWidgetArea);
   connections->hide();
@@ -547,7 +547,7 @@ void MainWindow::send_pointer() {
   ToolPointer& pointer = view_->pointer();
   if (pointer.pushing() && sent_.isValid() && sent_.hasExpired(kPointerSilence.count())) {
     pointer.release();
-    say(tr("The picture stood still for a second, so the hand let go. Press again."));
+    say(tr("The window was busy for a second, so the hand stopped pushing. Press again."));
   }
   sent_.start();
   if (spindle_->isChecked() != pointer.spindle()) spindle_->setChecked(pointer.spindle());
@@ -609,9 +609,9 @@ void MainWindow::show_help() {
       {tr("Pen"), tr("its tip pushes, as hard as you press it")},
       {tr("Sticks of a game pad"), tr("the left one moves the tool, the right one turns it")},
       {tr("Triggers of a game pad"), tr("the right one pushes, the left one runs the spindle")},
-      {tr("Buttons of a game pad"), tr("A: spindle, B: undo; those at the shoulders: motions at a tenth")},
+      {tr("Buttons of a game pad"), tr("A: spindle, B: undo; shoulder buttons: motion ten times smaller")},
       {tr("Right button, dragged"), tr("turns the tool; with Ctrl about its own axis")},
-      {tr("Shift"), tr("motions at a tenth")},
+      {tr("Shift"), tr("motion ten times smaller")},
       {tr("Space"), tr("spindle on or off")},
       {tr("I and U"), tr("irrigation and suction of the other hand, on or off")},
       {tr("Escape"), tr("puts the tool down")},

@@ -137,7 +137,7 @@ void MainWindow::make_tools_menu() {
   sound_->setCheckable(true);
   sound_->setChecked(sound_control_->on());
   add_action(
-      tools, tr("&Volume and wave form…"), "sound_settings", QKeySequence("Ctrl+Shift+V"),
+      tools, tr("&Volume and waveform…"), "sound_settings", QKeySequence("Ctrl+Shift+V"),
       [this] { sound_control_->show_dialog(); }, false);
 }
 

@@ -29,7 +29,7 @@ void PadHand::tick(bool may_act, const PadFeel& feel) {
     events_.said(tr("%1: choose a tool. The left stick moves it, the right trigger pushes.").arg(name));
   } else if (change == GamePad::Change::lost) {
     let_go();
-    events_.said(tr("%1 was unplugged and has let the tool go.").arg(name));
+    events_.said(tr("%1 was unplugged. It no longer leads the tool.").arg(name));
   }
   if (!pad_.is_open()) return;
   if (!may_act) return rest();

@@ -11,11 +11,11 @@ namespace osteon {
 
 class BoneView;
 
-// What the hand gets. Zero where nothing is known of it.
+// What the pad's motors show. Zero while no recent state is known.
 struct PadFeel {
-  double force_n = 0;
-  double most_n = 0;  // that the device holds
-  bool cuts = false;  // material goes
+  double force_n = 0;  // on the hand
+  double most_n = 0;   // the most that the hand's device holds for long
+  bool cuts = false;   // the tool removes material
 };
 
 // [GUI thread]
@@ -24,16 +24,16 @@ class PadHand {
 
  public:
   struct Events {
-    std::function<void(const QString& sentence)> said;  // a pad came or went
+    std::function<void(const QString& sentence)> said;  // a pad was plugged in or unplugged
     std::function<void()> undo;
   };
 
   PadHand(BoneView& view, Events events);
 
-  // To be called at the rate at which the pad is read. Without a pad it only looks for one, once a second.
-  // `may_act`: the window is the one in front. Otherwise the pad holds nothing and rests.
+  // Reads the pad, moves the tool and sets the motors. Call it at the rate at which the pad is to be read. Without a
+  // pad it only looks for one, once a second. `may_act`: this window is in front. Otherwise it does what rest() does.
   void tick(bool may_act, const PadFeel& feel);
-  // Ticks pause until the next one: the pad holds nothing and rests.
+  // For a pause between ticks: releases all controls and stops the motors.
   void rest();
 
  private:

@@ -58,7 +58,7 @@ QString PracticeRoom::end_of(const ChildProcess& child) {
   // The last line of a program that was killed is about something else.
   if (child.exitStatus() == QProcess::CrashExit) return tr("%1 was ended by force or crashed.").arg(name);
   const QString said = child.last_sentence();
-  return said.isEmpty() ? tr("%1 ended without a word.").arg(name) : said;
+  return said.isEmpty() ? tr("%1 ended and gave no reason.").arg(name) : said;
 }
 
 ProgramState PracticeRoom::state_of(const ChildProcess* child, const Past& past) {

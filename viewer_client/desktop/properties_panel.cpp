@@ -54,7 +54,7 @@ PropertiesPanel::PropertiesPanel(std::function<void(const Chosen&)> changed,
   teeth_ = new QLabel;
   row(tr("Teeth"), "teeth", teeth_);
   feed_ = new QLabel;
-  row(tr("Feed per turn"), "feed_per_turn", feed_);
+  row(tr("Feed per revolution"), "feed_per_turn", feed_);
   const auto say = [this] {
     if (!showing_) changed_(chosen());
   };

@@ -1,4 +1,4 @@
-// How far the tip of the tool is from the nearest structure at risk, in the lower bar.
+// How far the tip of the tool is from the nearest structure at risk, in the status bar.
 #pragma once
 #include <QCoreApplication>
 #include <QLabel>
@@ -23,7 +23,7 @@ class RiskGauge : public QLabel {
   // The tip in the bone's frame. None: no tool.
   void show_tip(const std::optional<Vec3>& tip_mm);
 
-  // Below this distance it warns. It is kept in the settings.
+  // Below this distance, mm, the gauge warns. The settings store it.
   [[nodiscard]] double limit_mm() const { return limit_mm_; }
   void set_limit_mm(double limit_mm);
   [[nodiscard]] bool warns() const { return warns_; }

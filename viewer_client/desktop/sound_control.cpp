@@ -71,8 +71,8 @@ void SoundControl::refresh() {
 }
 
 QString SoundControl::missing() const {
-  if (!server_) return tr("There is sound in a room to practise in. Open a bone first.");
-  return chosen_.on ? tr("The audio client has not said anything yet.") : tr("The sound is off.");
+  if (!server_) return tr("Only a practice room has sound. Open a bone first.");
+  return chosen_.on ? tr("The audio client has not reported yet.") : tr("The sound is off.");
 }
 
 std::optional<SoundReport> SoundControl::report() { return server_ ? server_->newest() : std::nullopt; }

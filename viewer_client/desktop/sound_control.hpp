@@ -1,4 +1,4 @@
-// What the window has to do with the sound: the socket to the audio client, the dialog, and what is remembered.
+// The window's part of the sound: the socket to the audio client, the dialog, and the stored settings.
 #pragma once
 #include <QCoreApplication>
 #include <QObject>
@@ -18,21 +18,21 @@ class SoundControl : public QObject {
 
  public:
   struct Events {
-    std::function<void(bool on)> switched;                // by the dialog
-    std::function<void(const QString& sentence)> notice;  // the device went away
+    std::function<void(bool on)> switched;                // the sound is on or off now
+    std::function<void(const QString& sentence)> notice;  // why there is no sound
   };
-  // With what was chosen last. `window`: the dialog's parent.
+  // Begins with the stored settings. `window`: the dialog's parent.
   SoundControl(Events events, QWidget* window);  // owned by the window
 
   // Makes the socket for the audio client of the next room. Errors: those of SoundServer::listen().
   [[nodiscard]] Result<void> listen(const std::filesystem::path& socket);
-  void close();  // removes it
+  void close();  // removes the socket
   [[nodiscard]] bool on() const { return chosen_.on; }
   void set_on(bool on);
   void show_dialog();
-  // Says what is wished, and shows what was heard. To be called at the pace of the gauges.
+  // Sends the settings and shows the newest report. Call it at the pace of the gauges.
   void refresh();
-  // None: there is no audio client, or it has said nothing yet.
+  // None: there is no audio client, or it has not reported yet.
   [[nodiscard]] std::optional<SoundReport> report();
 
  private:
@@ -45,7 +45,7 @@ class SoundControl : public QObject {
   SoundDialog::Chosen chosen_;
   std::unique_ptr<SoundServer> server_;
   SoundDialog* dialog_ = nullptr;  // the window's
-  std::string trouble_;            // that was told last
+  std::string trouble_;            // the one that notice got last
 };
 
 }  // namespace osteon

@@ -40,7 +40,7 @@ double amplitude_of(int percent) { return std::pow(std::clamp(percent, 0, 100) /
 WavePlot::WavePlot(QWidget* parent) : QWidget(parent) {
   setObjectName("wave");
   setMinimumHeight(110);
-  setAccessibleName(tr("Wave form of the sound"));
+  setAccessibleName(tr("Waveform of the sound"));
 }
 
 void WavePlot::show_wave(const std::vector<int>& wave, double rate_hz) {
@@ -103,7 +103,7 @@ SoundDialog::SoundDialog(const Chosen& chosen, std::function<void(const Chosen&)
   };
   level_ = row(tr("Level"), "sound_level");
   work_ = row(tr("Computing time of a buffer"), "sound_work");
-  latency_ = row(tr("From the tool to the ear, at most"), "sound_latency");
+  latency_ = row(tr("Latency from tool to ear, at most"), "sound_latency");
   gaps_ = row(tr("Gaps"), "sound_gaps");
   device_ = row(tr("Device"), "sound_device");
   trouble_ = new QLabel;

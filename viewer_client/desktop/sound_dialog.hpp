@@ -1,5 +1,5 @@
-// The sound of the practice room: volume, on and off, and what is played. The wave form scrolls by while the dialog is
-// open; a missing device is named in it.
+// The dialog of the practice room's sound: volume, on and off, and what is played. While it is open it shows the newest
+// waveform, or why there is no sound.
 #pragma once
 #include <QCoreApplication>
 #include <QDialog>
@@ -49,7 +49,7 @@ class SoundDialog : public QDialog {
   // `changed` is called when the user has set something.
   SoundDialog(const Chosen& chosen, std::function<void(const Chosen&)> changed, QWidget* parent);
   void set_on(bool on);
-  // `missing`: why there is no report, for people.
+  // `missing`: why there is no report, as a text of the window.
   void show_report(const std::optional<SoundReport>& report, const QString& missing);
 
  private:
@@ -63,11 +63,11 @@ class SoundDialog : public QDialog {
   bool showing_ = false;  // a change is not the user's
 };
 
-// The factor of the amplitude for a volume in percent. The ear hears ratios, so it is the third power, as that of the
-// sliders of a desktop.
+// Factor of the amplitude for a volume in percent. The ear hears ratios, so it is the third power, as with the volume
+// sliders of desktops.
 [[nodiscard]] double amplitude_of(int percent);
 
-// The trouble of a SoundReport in the language of the window. A sentence that is not known stays as it is.
+// The trouble of a SoundReport in the language of the window. An unknown sentence stays as it is.
 [[nodiscard]] QString sound_trouble(const std::string& said);
 
 }  // namespace osteon

@@ -26,7 +26,7 @@ QVariantList numbers_of(const CameraView& view) {
 
 ViewOptions::ViewOptions(BoneView& view, QMenu& menu, const Add& add, Say say, QObject* parent)
     : QObject(parent), view_(view), say_(std::move(say)) {
-  add_switch(menu, add, tr("Cube of the patient's sides"), "marker", QKeySequence("Ctrl+K"),
+  add_switch(menu, add, tr("Orientation cube"), "marker", QKeySequence("Ctrl+K"),
              [this](bool on) { view_.show_marker(on); });
   overlays_ = menu.addMenu(tr("Overlays"));
   add_switch(*overlays_, add, tr("Planned axes and regions"), "planned", QKeySequence("Ctrl+L"),
@@ -34,9 +34,9 @@ ViewOptions::ViewOptions(BoneView& view, QMenu& menu, const Add& add, Say say, Q
   add_switch(*overlays_, add, tr("Structures at risk"), "risks", QKeySequence("Ctrl+R"),
              [this](bool on) { view_.show_risks(on); });
   add_stereo(*menu.addMenu(tr("Stereo picture")), add);
-  QMenu& kept = *menu.addMenu(tr("Kept views"));
-  add(&kept, tr("Keep this view"), "keep_view", QKeySequence("Ctrl+B"), [this] { keep_view(); });
-  add(&kept, tr("Forget the kept views"), "forget_views", {}, [this] { forget_views(); });
+  QMenu& kept = *menu.addMenu(tr("Saved views"));
+  add(&kept, tr("Save this view"), "keep_view", QKeySequence("Ctrl+B"), [this] { keep_view(); });
+  add(&kept, tr("Delete the saved views"), "forget_views", {}, [this] { forget_views(); });
   kept.addSeparator();
   for (int number = 1; number <= kMostViews; ++number) {
     const QByteArray name = "view_" + QByteArray::number(number);
@@ -94,11 +94,11 @@ QString ViewOptions::key() const {
 void ViewOptions::keep_view() {
   QSettings settings;
   QVariantList views = settings.value(key()).toList();
-  if (views.size() >= kMostViews) return say_(tr("Nine views are kept already. Forget them first."));
+  if (views.size() >= kMostViews) return say_(tr("Nine views are saved already. Delete them first."));
   views << QVariant(numbers_of(view_.camera()));
   settings.setValue(key(), views);
   refresh();
-  say_(tr("Kept as view %1.").arg(views.size()));
+  say_(tr("Saved as view %1.").arg(views.size()));
 }
 
 void ViewOptions::forget_views() {

@@ -1,5 +1,5 @@
-// The part of the menu View that says how the bone is drawn: the cube of the patient's sides, stereo, and views that
-// the user keeps.
+// The part of the menu View that says how the bone is drawn: orientation cube, overlays, stereo, and the views that the
+// user has saved.
 #pragma once
 #include <QCoreApplication>
 #include <QKeySequence>
@@ -28,9 +28,9 @@ class ViewOptions : public QObject {
   // `view` and the menu must outlive it.
   ViewOptions(BoneView& view, QMenu& menu, const Add& add, Say say, QObject* parent);
 
-  // The menu of what is drawn over the bone.
+  // The menu of overlays: what the picture shows of the case's plan over the bone.
   [[nodiscard]] QMenu* overlays() const { return overlays_; }
-  // Kept views are of one bone.
+  // Saved views are of one bone.
   void show_bone(const QString& title);
 
  private:

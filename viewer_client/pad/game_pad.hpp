@@ -1,4 +1,4 @@
-// A game pad, read by the game controllers of SDL 2. Which control is which is known to SDL's own list of pads.
+// A game pad, read through SDL 2. SDL's own list of pads says which control is which.
 #pragma once
 #include <memory>
 #include <string>
@@ -7,7 +7,7 @@
 
 namespace osteon {
 
-// The first pad that is there. [one thread: that of the constructor]
+// The first pad that SDL lists. [one thread: that of the constructor]
 class GamePad {
  public:
   enum class Change { none, opened, lost };
@@ -18,11 +18,12 @@ class GamePad {
   // Looks for a pad while none is open, and reads the open one.
   Change poll();
   [[nodiscard]] bool is_open() const;
-  // For people. Of the pad that was open last.
+  // Of the pad that was open last, for texts of the window.
   [[nodiscard]] const std::string& name() const;
   // As of the last poll(). At rest while no pad is open.
   [[nodiscard]] const PadState& state() const;
-  // The motors run so until the next call or poll() after kRumble_ms. A pad without motors ignores it.
+  // Sets the strength of the motors. It lasts until the next call, or ends at the first poll() after kRumble_ms. A pad
+  // without motors ignores it.
   void rumble(const PadRumble& strength);
   static constexpr unsigned kRumble_ms = 150;
 

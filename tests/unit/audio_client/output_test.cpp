@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "audio_client/output/audio_output.hpp"
-#include "audio_client/output/kept_output.hpp"
+#include "audio_client/output/reconnecting_output.hpp"
 #include "audio_client/output/sound_engine.hpp"
 #include "audio_client/output/volume_ramp.hpp"
 #include "common/sound/levels.hpp"
@@ -185,35 +185,35 @@ struct StandInOutput final : AudioOutput {
   std::string& why_;
 };
 
-TEST(KeptOutput, IsOpenedAgainAfterItsDeviceCameBack) {
+TEST(ReconnectingOutput, IsOpenedAgainAfterItsDeviceCameBack) {
   std::string why;
   bool there = false;
   int attempts = 0;
-  KeptOutput output([&]() -> Result<std::unique_ptr<AudioOutput>> {
+  ReconnectingOutput output([&]() -> Result<std::unique_ptr<AudioOutput>> {
     ++attempts;
     if (!there) return failure(ErrorCode::unavailable, "no device");
     return std::make_unique<StandInOutput>(why);
   });
   EXPECT_FALSE(output.open());
   EXPECT_EQ(output.trouble(), "no device");
-  const auto start = KeptOutput::Clock::now();
-  output.keep(start, false);
+  const auto start = ReconnectingOutput::Clock::now();
+  output.maintain(start, false);
   EXPECT_EQ(attempts, 1) << "not wanted";
-  output.keep(start, true);
-  output.keep(start + 1s, true);
+  output.maintain(start, true);
+  output.maintain(start + 1s, true);
   EXPECT_EQ(attempts, 2) << "not at each call";
   there = true;
-  output.keep(start + 3s, true);
+  output.maintain(start + 3s, true);
   EXPECT_EQ(output.trouble(), "");
   EXPECT_EQ(output.latency(), 7ms);
-  output.keep(start + 9s, true);
+  output.maintain(start + 9s, true);
   EXPECT_EQ(attempts, 3) << "it plays";
   why = "the sound server went away";
-  output.keep(start + 10s, true);
+  output.maintain(start + 10s, true);
   EXPECT_EQ(output.trouble(), why);
   EXPECT_EQ(output.latency(), 0ms);
   why.clear();
-  output.keep(start + 13s, true);
+  output.maintain(start + 13s, true);
   EXPECT_EQ(output.trouble(), "");
   EXPECT_EQ(output.gaps(), 4U) << "of both";
 }

@@ -33,10 +33,10 @@ SoundReport a_report() {
 }
 
 TEST(SoundMessage, ComesBackAsItWas) {
-  for (const SoundWish& wish : {SoundWish{}, SoundWish{0.0, false}, SoundWish{0.375, true}}) {
-    const auto read = read_sound_wish(encode(wish));
+  for (const SoundSettings& settings : {SoundSettings{}, SoundSettings{0.0, false}, SoundSettings{0.375, true}}) {
+    const auto read = read_sound_settings(encode(settings));
     ASSERT_TRUE(read) << read.error().message;
-    EXPECT_EQ(*read, wish);
+    EXPECT_EQ(*read, settings);
   }
   for (const SoundReport& report : {SoundReport{}, a_report()}) {
     const auto read = read_sound_report(encode(report));
@@ -93,9 +93,9 @@ TEST(SoundMessage, EachFieldIsChecked) {
     return std::vector<json>{nullptr, "1", true, json::array({1}), least - 0.01, 1.001 * most, 1e300};
   };
   const std::vector<json> no_text{nullptr, 3, json::array(), std::string(513, 'x')};
-  expect_each_refused(encode(SoundWish{}),
+  expect_each_refused(encode(SoundSettings{}),
                       {{"version", kNoVersion}, {"volume", no_number(0, 1)}, {"on", {nullptr, 0, "true"}}},
-                      [](const std::string& text) { return read_sound_wish(text); });
+                      [](const std::string& text) { return read_sound_settings(text); });
   expect_each_refused(
       encode(a_report()),
       {{"version", kNoVersion},
@@ -112,8 +112,8 @@ TEST(SoundMessage, EachFieldIsChecked) {
        {"device", no_text},
        {"trouble", no_text}},
       [](const std::string& text) { return read_sound_report(text); });
-  EXPECT_FALSE(read_sound_wish(encode(a_report()))) << "neither end takes the other's messages";
-  EXPECT_FALSE(read_sound_report(encode(SoundWish{})));
+  EXPECT_FALSE(read_sound_settings(encode(a_report()))) << "neither end takes the other's messages";
+  EXPECT_FALSE(read_sound_report(encode(SoundSettings{})));
 }
 
 TEST(SoundLink, WishesAndReportsArrive) {
@@ -125,9 +125,9 @@ TEST(SoundLink, WishesAndReportsArrive) {
   ASSERT_TRUE(client) << client.error().message;
   (*window)->send({0.25, true});
   (*window)->send({0.5, true});
-  const auto wish = (*client)->wait(0);
-  ASSERT_TRUE(wish);
-  EXPECT_EQ(wish->volume, 0.5) << "the newest counts";
+  const auto settings = (*client)->wait(0);
+  ASSERT_TRUE(settings);
+  EXPECT_EQ(settings->volume, 0.5) << "the newest counts";
   (*client)->send(a_report());
   ASSERT_TRUE((*window)->newest());
   EXPECT_EQ(*(*window)->newest(), a_report());

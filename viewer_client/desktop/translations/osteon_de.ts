@@ -628,8 +628,8 @@
         <translation>Das Zeigergerät fehlt</translation>
     </message>
     <message>
-        <source>Open the bone</source>
-        <translation>Knochen öffnen</translation>
+        <source>Clipping</source>
+        <translation>Schnittansicht</translation>
     </message>
     <message>
         <source>Save &amp;bone as…</source>
@@ -732,8 +732,8 @@
         <translation>Umschalt</translation>
     </message>
     <message>
-        <source>motions at a tenth</source>
-        <translation>ein Zehntel der Bewegung</translation>
+        <source>motion ten times smaller</source>
+        <translation>zehnmal kleinere Bewegungen</translation>
     </message>
     <message>
         <source>Space</source>
@@ -776,7 +776,7 @@
         <translation>Linke Taste und Rad bewegen die Ansicht</translation>
     </message>
     <message>
-        <source>&amp;Volume and wave form…</source>
+        <source>&amp;Volume and waveform…</source>
         <translation>&amp;Lautstärke und Wellenform…</translation>
     </message>
     <message>
@@ -856,12 +856,12 @@
         <translation>Tasten eines Gamepads</translation>
     </message>
     <message>
-        <source>A: spindle, B: undo; those at the shoulders: motions at a tenth</source>
-        <translation>A: Spindel, B: rückgängig; Schultertasten: Bewegungen auf ein Zehntel</translation>
+        <source>A: spindle, B: undo; shoulder buttons: motion ten times smaller</source>
+        <translation>A: Spindel, B: rückgängig; Schultertasten: zehnmal kleinere Bewegungen</translation>
     </message>
     <message>
-        <source>The picture stood still for a second, so the hand let go. Press again.</source>
-        <translation>Das Bild stand eine Sekunde still. Die Hand hat losgelassen. Drücken Sie neu.</translation>
+        <source>The window was busy for a second, so the hand stopped pushing. Press again.</source>
+        <translation>Das Fenster war eine Sekunde beschäftigt. Die Hand drückt nicht mehr. Neu drücken.</translation>
     </message>
 </context>
 <context>
@@ -875,8 +875,8 @@
         <translation>%1: Wählen Sie ein Werkzeug. Linker Stick bewegt es, rechter Trigger drückt.</translation>
     </message>
     <message>
-        <source>%1 was unplugged and has let the tool go.</source>
-        <translation>%1 ist nicht mehr angeschlossen und hat das Werkzeug losgelassen.</translation>
+        <source>%1 was unplugged. It no longer leads the tool.</source>
+        <translation>%1 ist nicht mehr angeschlossen. Es führt das Werkzeug nicht mehr.</translation>
     </message>
 </context>
 <context>
@@ -918,8 +918,8 @@
         <translation>%1 wurde gewaltsam beendet oder ist abgestürzt.</translation>
     </message>
     <message>
-        <source>%1 ended without a word.</source>
-        <translation>%1 endete ohne ein Wort.</translation>
+        <source>%1 ended and gave no reason.</source>
+        <translation>%1 endete, ohne einen Grund zu nennen.</translation>
     </message>
     <message>
         <source>The audio client ended and starts again.</source>
@@ -953,7 +953,7 @@
         <translation>Zähne</translation>
     </message>
     <message>
-        <source>Feed per turn</source>
+        <source>Feed per revolution</source>
         <translation>Vorschub je Umdrehung</translation>
     </message>
     <message>
@@ -1047,11 +1047,11 @@
         <translation>Es gibt keinen Ton: %1</translation>
     </message>
     <message>
-        <source>There is sound in a room to practise in. Open a bone first.</source>
-        <translation>Ton gibt es in einem Übungsraum. Öffnen Sie zuerst einen Knochen.</translation>
+        <source>Only a practice room has sound. Open a bone first.</source>
+        <translation>Ton gibt es nur in einem Übungsraum. Öffnen Sie zuerst einen Knochen.</translation>
     </message>
     <message>
-        <source>The audio client has not said anything yet.</source>
+        <source>The audio client has not reported yet.</source>
         <translation>Das Tonprogramm hat sich noch nicht gemeldet.</translation>
     </message>
     <message>
@@ -1090,8 +1090,8 @@
         <translation>Rechenzeit je Puffer</translation>
     </message>
     <message>
-        <source>From the tool to the ear, at most</source>
-        <translation>Vom Werkzeug zum Ohr, höchstens</translation>
+        <source>Latency from tool to ear, at most</source>
+        <translation>Latenz vom Werkzeug zum Ohr, höchstens</translation>
     </message>
     <message>
         <source>Gaps</source>
@@ -1394,24 +1394,24 @@
 <context>
     <name>ViewOptions</name>
     <message>
-        <source>Cube of the patient&apos;s sides</source>
-        <translation>Würfel mit den Seiten des Patienten</translation>
+        <source>Orientation cube</source>
+        <translation>Orientierungswürfel</translation>
     </message>
     <message>
         <source>Stereo picture</source>
         <translation>Stereobild</translation>
     </message>
     <message>
-        <source>Kept views</source>
-        <translation>Gemerkte Ansichten</translation>
+        <source>Saved views</source>
+        <translation>Gespeicherte Ansichten</translation>
     </message>
     <message>
-        <source>Keep this view</source>
-        <translation>Diese Ansicht merken</translation>
+        <source>Save this view</source>
+        <translation>Diese Ansicht speichern</translation>
     </message>
     <message>
-        <source>Forget the kept views</source>
-        <translation>Gemerkte Ansichten vergessen</translation>
+        <source>Delete the saved views</source>
+        <translation>Gespeicherte Ansichten löschen</translation>
     </message>
     <message>
         <source>View %1</source>
@@ -1438,12 +1438,12 @@
         <translation>Kein Quad-Buffer, deshalb ist Stereo aus. Wählen Sie Anaglyph oder Nebeneinander.</translation>
     </message>
     <message>
-        <source>Nine views are kept already. Forget them first.</source>
-        <translation>Neun Ansichten sind schon gemerkt. Vergessen Sie diese zuerst.</translation>
+        <source>Nine views are saved already. Delete them first.</source>
+        <translation>Neun Ansichten sind schon gespeichert. Löschen Sie diese zuerst.</translation>
     </message>
     <message>
-        <source>Kept as view %1.</source>
-        <translation>Als Ansicht %1 gemerkt.</translation>
+        <source>Saved as view %1.</source>
+        <translation>Als Ansicht %1 gespeichert.</translation>
     </message>
     <message>
         <source>Planned axes and regions</source>
@@ -1461,7 +1461,7 @@
 <context>
     <name>WavePlot</name>
     <message>
-        <source>Wave form of the sound</source>
+        <source>Waveform of the sound</source>
         <translation>Wellenform des Tons</translation>
     </message>
     <message>

@@ -1,4 +1,4 @@
-// An output that is opened again when its device went away, or was not there at first.
+// An audio output that reconnects: it opens its device again after the device was lost, or was missing at the start.
 #pragma once
 #include <chrono>
 #include <cstdint>
@@ -12,23 +12,23 @@
 namespace osteon::audio {
 
 // For one thread. No call waits for a device to come.
-class KeptOutput {
+class ReconnectingOutput {
  public:
   using Clock = std::chrono::steady_clock;
   using Open = std::function<Result<std::unique_ptr<AudioOutput>>()>;
-  static constexpr std::chrono::seconds kAgain{2};  // from one attempt to the next
+  static constexpr std::chrono::seconds kRetryInterval{2};  // from one attempt to the next
 
-  explicit KeptOutput(Open open) : open_(std::move(open)) {}
+  explicit ReconnectingOutput(Open open) : open_(std::move(open)) {}
 
-  // The first attempts. An error is also that of trouble().
+  // The first attempts. Errors: those of AudioOutput; trouble() keeps the sentence.
   [[nodiscard]] Result<void> open();
   [[nodiscard]] Result<void> start();
   [[nodiscard]] bool opened() const { return output_ != nullptr; }
-  // Drops an output that has failed. `again`: opens and starts another when it is time.
-  void keep(Clock::time_point now, bool again);
-  void stop() noexcept;  // no frame is asked for afterwards, until keep() starts an output
+  // Drops an output that has failed. `again`: opens and starts another one every kRetryInterval.
+  void maintain(Clock::time_point now, bool again);
+  void stop() noexcept;  // no frame is asked for afterwards, until maintain() starts an output
 
-  // Why nothing is played, as one sentence; empty: it is played.
+  // One sentence that says why nothing is played. Empty: the sound is played.
   [[nodiscard]] const std::string& trouble() const { return trouble_; }
   [[nodiscard]] std::chrono::nanoseconds latency() const;  // 0 without an output
   [[nodiscard]] std::uint64_t gaps() const;                // of all outputs
