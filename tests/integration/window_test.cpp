@@ -92,6 +92,10 @@ TEST_F(WindowTest, WheelSpaceAndShiftSetPushSpindleAndFineMotion) {
   EXPECT_TRUE(view_->pointer().input().fine);
   QTest::keyRelease(view_, Qt::Key_Shift);
   EXPECT_FALSE(view_->pointer().input().fine);
+  // The bar says what the mouse does: with an empty hand nothing is pushed.
+  EXPECT_TRUE(window_->statusBar()->currentMessage().startsWith("The left button pushes"));
+  trigger("put_down");
+  EXPECT_TRUE(window_->statusBar()->currentMessage().startsWith("Choose a tool"));
 }
 
 // A picture costs much of a processor where software draws it.
