@@ -7,9 +7,11 @@
 
 #include <cstdio>
 #include <exception>
+#include <sstream>
 #include <string>
 #include <vector>
 
+#include "common/runtime/files.hpp"
 #include "server/import/new_folder.hpp"
 
 namespace osteon::import {
@@ -24,7 +26,7 @@ struct Uids {
   std::string study, series, frame;
 };
 
-bool write_slice(const imaging::HuVolume& volume, int slice, const Uids& uids, const fs::path& file) {
+Result<void> write_slice(const imaging::HuVolume& volume, int slice, const Uids& uids, const fs::path& file) {
   const std::size_t pixels = static_cast<std::size_t>(volume.dims[0]) * static_cast<std::size_t>(volume.dims[1]);
   std::vector<std::int16_t> stored(pixels);
   for (std::size_t i = 0; i < pixels; ++i)
@@ -67,8 +69,7 @@ bool write_slice(const imaging::HuVolume& volume, int slice, const Uids& uids, c
   set(0x0020, 0x0052, uids.frame);
   set(0x0020, 0x0011, "1");
   set(0x0020, 0x0013, std::to_string(slice + 1));
-  writer.SetFileName(file.c_str());
-  return writer.Write();
+  return write_dicom(writer, file);
 }
 
 Result<void> write_slices(const imaging::HuVolume& volume, const fs::path& folder, const KeepGoing& keep_going) try {
@@ -81,8 +82,7 @@ Result<void> write_slices(const imaging::HuVolume& volume, const fs::path& folde
     if (!keep_going(static_cast<double>(slice) / volume.dims[2])) return stopped_while("writing " + folder.string());
     char name[32];
     std::snprintf(name, sizeof name, "slice-%04d.dcm", slice + 1);
-    if (!write_slice(volume, slice, uids, folder / name))
-      return failure(ErrorCode::internal, "cannot write " + (folder / name).string() + "; is the disk full?");
+    if (auto written = write_slice(volume, slice, uids, folder / name); !written) return written;
   }
   return {};
 } catch (const std::exception& error) {
@@ -90,6 +90,15 @@ Result<void> write_slices(const imaging::HuVolume& volume, const fs::path& folde
 }
 
 }  // namespace
+
+Result<void> write_dicom(gdcm::Writer& writer, const fs::path& file) {
+  std::ostringstream bytes;
+  writer.SetStream(bytes);
+  if (!writer.Write()) return failure(ErrorCode::internal, "cannot make the slice " + file.string());
+  auto written = write_file(file, bytes.str());
+  if (!written) written.error().message += "; make room on the disk or choose another place";
+  return written;
+}
 
 Result<void> write_dicom_series(const imaging::HuVolume& volume, const fs::path& folder, const KeepGoing& keep_going) {
   gdcm::Trace::DebugOff();

@@ -29,10 +29,10 @@ std::string decimal_text(double value) {
   return text;
 }
 
-bool move_slice(const fs::path& file, const Vec3& position_mm) {
+Result<void> move_slice(const fs::path& file, const Vec3& position_mm) {
   gdcm::Reader reader;
   reader.SetFileName(file.c_str());
-  if (!reader.Read()) return false;
+  if (!reader.Read()) return failure(ErrorCode::internal, "cannot read " + file.string() + " again");
   std::string value =
       decimal_text(position_mm.x()) + "\\" + decimal_text(position_mm.y()) + "\\" + decimal_text(position_mm.z());
   if (value.size() % 2 != 0) value += ' ';
@@ -42,8 +42,7 @@ bool move_slice(const fs::path& file, const Vec3& position_mm) {
   reader.GetFile().GetDataSet().Replace(element);
   gdcm::Writer writer;
   writer.SetFile(reader.GetFile());
-  writer.SetFileName(file.c_str());
-  return writer.Write();
+  return write_dicom(writer, file);
 }
 
 // The first pixels of the slices. The table moves along z, also if the gantry is tilted.
@@ -98,8 +97,11 @@ Result<void> write_simulated_scan(const ScannerSettings& settings, const Blurred
   for (const auto& entry : fs::directory_iterator(folder)) files.push_back(entry.path());
   std::ranges::sort(files);
   for (std::size_t i = 0; i < files.size(); ++i)
-    if (!move_slice(files[i], positions[i]))
-      return failure(ErrorCode::internal, "cannot write " + files[i].string() + "; is the disk full?");
+    if (auto moved = move_slice(files[i], positions[i]); !moved) {
+      std::error_code ignored;
+      fs::remove_all(folder, ignored);
+      return moved;
+    }
   return {};
 }
 

@@ -61,7 +61,7 @@ Result<std::string> read_yaml_list(const std::filesystem::path& file, const Yaml
   const auto size = std::filesystem::file_size(file, error);
   if (error || !std::filesystem::is_regular_file(file, error))
     return failure(ErrorCode::not_found,
-                   "there is no file of " + name + " " + file.string() + "; give that of a YAML file");
+                   "there is no file of " + name + " " + file.string() + "; give the name of a YAML file");
   if (size > kMostYamlBytes)
     return bad_input(file.string() + " is longer than 1 MiB, more than any list of " + name + "; give another file");
   std::ifstream stream(file, std::ios::binary);

@@ -51,8 +51,15 @@ class WindowTest : public test::WindowBench {};
 
 TEST_F(WindowTest, AMouseDrillsTheBoneAndUndoBringsItBack) {
   open();
+  const CameraView seen = view_->camera();
   drill();
+  // A drag sweeps the tool, and leaves the bone as it is seen.
+  hover(middle() + QPoint(6, 3));
+  hover(middle());
   release(middle());
+  EXPECT_EQ(view_->camera().eye_mm, seen.eye_mm);
+  EXPECT_EQ(view_->camera().target_mm, seen.target_mm);
+  EXPECT_EQ(view_->camera().up, seen.up);
   const auto state = [&] { return view_->updater()->states().front(); };
   ASSERT_FALSE(view_->updater()->states().empty());
   EXPECT_EQ(state().tool_name, "drill-3.2");
@@ -73,7 +80,9 @@ TEST_F(WindowTest, WheelSpaceAndShiftSetPushSpindleAndFineMotion) {
   const double before_n = view_->pointer().push_n();
   const QPointF at = middle();
   QWheelEvent wheel(at, view_->mapToGlobal(middle()), {}, {0, 360}, Qt::NoButton, {}, Qt::NoScrollPhase, false);
+  const CameraView seen = view_->camera();
   QApplication::sendEvent(view_, &wheel);
+  EXPECT_EQ(view_->camera().eye_mm, seen.eye_mm) << "the wheel does one of both";
   EXPECT_DOUBLE_EQ(view_->pointer().push_n(), before_n + 3.0);
   EXPECT_EQ(window_->findChild<QSpinBox*>("push_set")->value(), static_cast<int>(before_n) + 3);
   EXPECT_TRUE(view_->pointer().spindle());
@@ -83,6 +92,10 @@ TEST_F(WindowTest, WheelSpaceAndShiftSetPushSpindleAndFineMotion) {
   EXPECT_TRUE(view_->pointer().input().fine);
   QTest::keyRelease(view_, Qt::Key_Shift);
   EXPECT_FALSE(view_->pointer().input().fine);
+  // The bar says what the mouse does: with an empty hand nothing is pushed.
+  EXPECT_TRUE(window_->statusBar()->currentMessage().startsWith("The left button pushes"));
+  trigger("put_down");
+  EXPECT_TRUE(window_->statusBar()->currentMessage().startsWith("Choose a tool"));
 }
 
 // How often the window is put together anew, for the picture or for any panel.

@@ -211,6 +211,18 @@ TEST_F(WrongUse, FilesThatAreNoCaseAreRefused) {
   EXPECT_EQ(recent_entries().size(), sessions);
 }
 
+TEST(WrongDisplay, IsOneSentenceAndNoAbort) {
+  // No X server has this number: the largest port is 65535, and displays begin at 6000.
+  for (const auto& [display, platform] : {std::pair(":60000", "xcb"), {"", "xcb"}, {":60000", "nonsense"}}) {
+    const auto tried =
+        test::run(test::program("osteon"), {}, 60s, {{{"DISPLAY", display}, {"QT_QPA_PLATFORM", platform}}, {}, {}});
+    EXPECT_EQ(tried.exit_code, 1);
+    EXPECT_EQ(tried.err, "osteon: no window can be opened here: DISPLAY is \"" + std::string(display) +
+                             "\" and QT_QPA_PLATFORM is \"" + platform +
+                             "\"; start it on a desktop, or with xvfb-run\n");
+  }
+}
+
 TEST_F(WrongUse, AFullDiskLeavesTheOldFileAndTheWork) {
   const fs::path folder = desk_->temp() / "disk", file = folder / "My block.osteon", picture = folder / "picture.png";
   fs::create_directory(folder);

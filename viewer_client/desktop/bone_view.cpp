@@ -10,6 +10,7 @@
 
 #include <vtkGenericOpenGLRenderWindow.h>
 #include <vtkNew.h>
+#include <vtkRenderWindowInteractor.h>
 
 namespace osteon {
 
@@ -28,6 +29,8 @@ BoneView::BoneView(QWidget* parent) : QVTKOpenGLNativeWidget(parent) {
   setFormat(QVTKOpenGLNativeWidget::defaultFormat());
   vtkNew<vtkGenericOpenGLRenderWindow> window;
   setRenderWindow(window);
+  // VTK's own style would turn and zoom at each drag and notch too, also while the tool pushes, and draw each time.
+  window->GetInteractor()->SetInteractorStyle(nullptr);
   scene_ = std::make_unique<BoneScene>(*window);
   setFocusPolicy(Qt::StrongFocus);
   setMouseTracking(true);

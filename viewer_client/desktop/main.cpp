@@ -6,6 +6,7 @@
 #include <QSurfaceFormat>
 #include <QTimer>
 #include <cstdio>
+#include <cstdlib>
 #include <string>
 
 #include "common/runtime/command_line.hpp"
@@ -56,6 +57,17 @@ Result<void> check_tool(const Arguments& arguments) {
                                            "names them");
 }
 
+// Before there is a window, Qt ends with some lines and an abort where it reaches no display.
+void say_no_display(QtMsgType type, const QMessageLogContext& context, const QString& text) {
+  if (type == QtFatalMsg)
+    std::_Exit(log::exit_with(
+        kProgram, {ErrorCode::not_found,
+                   "no window can be opened here: DISPLAY is \"" + qEnvironmentVariable("DISPLAY").toStdString() +
+                       "\" and QT_QPA_PLATFORM is \"" + qEnvironmentVariable("QT_QPA_PLATFORM").toStdString() +
+                       "\"; start it on a desktop, or with xvfb-run"}));
+  if (!QString(context.category).startsWith("qt.qpa")) std::fprintf(stderr, "%s\n", text.toUtf8().constData());
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -75,7 +87,9 @@ int main(int argc, char** argv) {
   if (qEnvironmentVariableIsEmpty("QT_QPA_PLATFORM")) qputenv("QT_QPA_PLATFORM", "xcb");
   QSurfaceFormat::setDefaultFormat(QVTKOpenGLNativeWidget::defaultFormat());
   QApplication::setAttribute(Qt::AA_EnableHighDpiScaling);
+  qInstallMessageHandler(say_no_display);
   QApplication qt(argc, argv);
+  qInstallMessageHandler(nullptr);
   QApplication::setApplicationName("osteon");
   QApplication::setOrganizationName("osteon");
   QApplication::setApplicationVersion(OSTEON_VERSION);

@@ -114,6 +114,7 @@ void MainWindow::make_tools_menu() {
       [this] {
         if (!view_->holding() && !view_->placing()) tour_->end();
         put_tool_down();
+        say(tr("Choose a tool on the left, then hold the left button on the bone."));
       },
       true);
   spindle_ = add_action(

@@ -5,6 +5,8 @@
 #include <fstream>
 
 #include "server/import/dicom_writer.hpp"
+#include "server/import/simulated_scanner.hpp"
+#include "tests/support/size_limit.hpp"
 #include "tests/support/temp_dir.hpp"
 #include "tests/unit/import/fixtures.hpp"
 
@@ -114,6 +116,27 @@ TEST(DicomSeries, WritingOverAFolderIsRefused) {
   const auto written = write_dicom_series(numbered_volume(7, 5, 4), folder.path(), keep_going);
   ASSERT_FALSE(written);
   EXPECT_EQ(written.error().code, ErrorCode::exists);
+}
+
+TEST(DicomSeries, AFullDiskIsOneSentenceAndLeavesNothing) {
+  const test::TempDir folder;
+  const auto volume = numbered_volume(40, 50, 2);
+  ScannerSettings settings;
+  settings.gaps_mm = {1.0, 1.0};
+  settings.width_mm = settings.height_mm = 30.0;
+  const auto refused = [&](const Result<void>& written) {
+    ASSERT_FALSE(written);
+    EXPECT_TRUE(written.error().message.ends_with("; make room on the disk or choose another place"))
+        << written.error().message;
+    EXPECT_TRUE(fs::is_empty(folder.path()));
+  };
+  // A slice has 2 bytes for each of at least 1800 pixels.
+  for (const rlim_t bytes : {0, 100, 1000, 3000}) {
+    const test::SizeLimit small(bytes);
+    refused(write_dicom_series(volume, folder / "series", keep_going));
+    refused(write_simulated_scan(
+        settings, [](const Vec3&) { return 0.0; }, folder / "scan", keep_going));
+  }
 }
 
 TEST(DicomSeries, AStoppedWriteLeavesNothing) {

@@ -293,7 +293,8 @@ TEST_F(RegisterCommand, RefusesInOneSentenceAndLeavesNothing) {
   };
   const std::string fixed = path("fixed.nii"), moving = path("moving.nii");
   refused({path("none.nii"), moving}, "none.nii");
-  refused({fixed, moving, "--landmarks", path("none.yaml")}, "there is no file of landmarks");
+  refused({fixed, moving, "--landmarks", path("none.yaml")},
+          "there is no file of landmarks " + path("none.yaml") + "; give the name of a YAML file");
   refused({fixed, moving, "--labels", path("none.nrrd")}, "none.nrrd");
   refused({fixed, moving, "--moving-axes", "LPS"},
           "--moving-axes is for raw numbers and PNG slices; give "
