@@ -281,7 +281,7 @@ MUTATIONS = [
     M("common/imaging/hu_volume.cpp", "if (!keep_going(static_cast<double>(slice - first[2]) / part.dims[2]))",
       "if (false)",
       "cropping a scan cannot be stopped", "unit.imaging", "HuVolume.Cropping*"),
-    M(POINTED, "return met_ && last_.cutting.engaged < kOut", "return last_.cutting.engaged > 2.0",
+    M(POINTED, "deeper && last_.cutting.engaged < kOut", "deeper && last_.cutting.engaged < kOut - 2.0",
       "a pointed hand never notices a breakthrough", "unit.pointed_hand", "PointedHand.LetsGo*"),
     M(POINTED, "      if (!there || !command_.push) {\n        enter(PointerPhase::withdraws);",
       "      if (!there || !command_.push) {\n        enter(PointerPhase::rests);",

@@ -116,7 +116,7 @@ TEST(SoundMessage, EachFieldIsChecked) {
   EXPECT_FALSE(read_sound_report(encode(SoundSettings{})));
 }
 
-TEST(SoundLink, WishesAndReportsArrive) {
+TEST(SoundLink, SettingsAndReportsArrive) {
   const test::TempDir folder;
   const auto window = SoundServer::listen(folder / "sound");
   ASSERT_TRUE(window) << window.error().message;
