@@ -36,7 +36,7 @@ class Bluntness {
 // leaves it in for ten diameters of cortical bone.
 //
 // Irrigation keeps drills from clogging (Lee 2018). We found no rate. Here water removes chips at a rate proportional
-// to their level: level' = filling - level / rinse_s [A]. So at a steady filling rate r the level tends to r · rinse_s.
+// to their level: level' = filling - level / rinse_s [A]. So at a steady filling rate r the level tends to r * rinse_s.
 // The model lets water reach all flutes. Real water hardly gets into a deep hole.
 struct CloggingParams {
   double capacity_diameters = 10.0;  // depth in cortical bone until they are full; softer bone gives fewer chips

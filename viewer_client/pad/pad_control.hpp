@@ -61,9 +61,9 @@ struct PadRumble {
   friend bool operator==(const PadRumble&, const PadRumble&) = default;
 };
 
-// The heavy motor follows the force on the hand as √(F / F_most): motors hardly turn at a tenth of their strength, so a
-// proportional law would hide a light touch. The light motor runs at half of that strength while the tool cuts. Both
-// rest below kFelt_n, where only the hand's tremor is left, and while F_most is not known (0).
+// The heavy motor follows the force on the hand as sqrt(F / F_most): motors hardly turn at a tenth of their strength,
+// so a proportional law would hide a light touch. The light motor runs at half of that strength while the tool cuts.
+// Both rest below kFelt_n, where only the hand's tremor is left, and while F_most is not known (0).
 inline constexpr double kFelt_n = 0.3;
 [[nodiscard]] PadRumble rumble_of(double force_n, double most_n, bool cuts) noexcept;
 
