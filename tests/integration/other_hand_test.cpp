@@ -66,7 +66,7 @@ TEST_F(OtherHand, IsLedByKeysAndBoxesAndWashesTheChipsOut) {
   // A window that hangs holds no drill.
   QThread::msleep(1500);
   EXPECT_TRUE(until([&] { return !view_->pointer().pushing(); })) << problem();
-  EXPECT_THAT(window_->statusBar()->currentMessage().toStdString(), testing::HasSubstr("the hand let go"));
+  EXPECT_THAT(window_->statusBar()->currentMessage().toStdString(), testing::HasSubstr("the hand stopped pushing"));
   release(middle());
 
   // Whoever leaves the room lets both go.
