@@ -51,6 +51,10 @@ TEST_F(OtherHand, IsLedByKeysAndBoxesAndWashesTheChipsOut) {
 
   // Chips fill the flutes of a drill that cuts, and stay in one that stands in its hole.
   view_->setFocus();
+  // A press during a slow frame is not lost.
+  QThread::msleep(1500);
+  press(middle());
+  EXPECT_TRUE(view_->pointer().pushing());
   ASSERT_TRUE(push_until([&] { return state().flutes_full > 0.1; })) << problem();
   QTest::keyClick(view_, Qt::Key_Space);
   ASSERT_TRUE(until([&] { return state().spindle_rpm < 1.0; })) << problem();

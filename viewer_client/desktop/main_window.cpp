@@ -545,11 +545,13 @@ void MainWindow::place_item(const SurfaceHit& hit) {
 void MainWindow::send_pointer() {
   if (!pointer_) return;
   ToolPointer& pointer = view_->pointer();
-  if (pointer.pushing() && sent_.isValid() && sent_.hasExpired(kPointerSilence.count())) {
+  // A press that waited for a slow frame is a new one: the hand has not let it go.
+  if (pointer.pushing() && sent_push_ && sent_.isValid() && sent_.hasExpired(kPointerSilence.count())) {
     pointer.release();
     say(tr("The window was busy for a second, so the hand stopped pushing. Press again."));
   }
   sent_.start();
+  sent_push_ = pointer.pushing();
   if (spindle_->isChecked() != pointer.spindle()) spindle_->setChecked(pointer.spindle());
   if (std::abs(pointer.push_n() - properties_->chosen().push_n) >= 1.0) tour_->did(TourStep::strength);
   gauges_->show_push(pointer.push_n());

@@ -157,8 +157,9 @@ class MainWindow : public QMainWindow {
   QString address_, room_name_;
   QTimer gauge_timer_, pointer_timer_, cap_timer_;
   QElapsedTimer clock_;
-  QElapsedTimer capped_;  // since the SpaceMouse was asked last
-  QElapsedTimer sent_;    // since the hand heard of the pointer
+  QElapsedTimer capped_;    // since the SpaceMouse was asked last
+  QElapsedTimer sent_;      // since the last message to the hand
+  bool sent_push_ = false;  // what it said
   SpaceMouseWatch space_mouse_{[](const std::string&) {}};
   std::unique_ptr<PadHand> pad_;  // from the first room on
 };
