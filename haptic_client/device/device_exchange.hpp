@@ -16,7 +16,7 @@ class DeviceExchange {
   static constexpr std::chrono::milliseconds kForceHeld{3};
   static constexpr int kReadsWithoutSample = 20;  // reads without a sample until the device is silent; assumption [A]
 
-  DeviceExchange() { go_absent(); }
+  explicit DeviceExchange(Time::duration force_held = kForceHeld) : force_held_(force_held) { go_absent(); }
 
   // [I/O, or the connection thread while no I/O thread runs]
   void publish(const DeviceReading& reading) noexcept {
@@ -32,12 +32,12 @@ class DeviceExchange {
     publish(last_);
   }
   void go_absent() noexcept { go(DeviceStatus::absent); }
-  // [I/O] The force that is wanted now; none when the haptic thread has written nothing for kForceHeld. The age counts
-  // from the time of writing. So a force ends on time even if this thread is late to see it.
+  // [I/O] The force that is wanted now; none when the haptic thread has written nothing for `force_held`. The age
+  // counts from the time of writing. So a force ends on time even if this thread is late to see it.
   [[nodiscard]] DeviceOutput demanded(Time now) noexcept {
     if (outputs_.refresh()) any_written_ = true;
     const Written& last = outputs_.value();
-    return any_written_ && now - last.at < kForceHeld ? last.output : DeviceOutput{};
+    return any_written_ && now - last.at < force_held_ ? last.output : DeviceOutput{};
   }
   // [I/O or connection thread, while no I/O thread runs] Discards everything that was written before.
   void forget_output() noexcept {
@@ -70,6 +70,7 @@ class DeviceExchange {
     Time at{};
   };
 
+  const Time::duration force_held_;
   TripleBuffer<DeviceReading> readings_;
   TripleBuffer<Written> outputs_;
   DeviceReading last_;         // I/O

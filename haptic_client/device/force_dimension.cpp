@@ -91,7 +91,7 @@ std::string text(const char* vendors) { return vendors ? vendors : ""; }
 
 class ForceDimension final : public HapticDevice {
  public:
-  explicit ForceDimension(const ForceDimensionOptions& options) : options_(options) {}
+  explicit ForceDimension(const ForceDimensionOptions& options) : options_(options), exchange_(options.force_held) {}
   ~ForceDimension() override { close(); }
 
   [[nodiscard]] std::string_view name() const override { return "force-dimension"; }

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <memory>
 
+#include "haptic_client/device/device_exchange.hpp"
 #include "haptic_client/device/haptic_device.hpp"
 
 namespace osteon::haptic {
@@ -13,6 +14,8 @@ struct ForceDimensionOptions {
   std::filesystem::path library;           // empty: libdhd.so, searched by the dynamic linker
   int number = 0;                          // among the connected devices
   std::chrono::microseconds period{1000};  // of its thread; 0: as fast as the device answers
+  // How long a force lasts that is not written again. Only a test that simulates time needs more.
+  std::chrono::milliseconds force_held = DeviceExchange::kForceHeld;
 };
 
 [[nodiscard]] std::unique_ptr<HapticDevice> make_force_dimension(const ForceDimensionOptions& options);
