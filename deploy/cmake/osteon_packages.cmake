@@ -45,6 +45,12 @@ pkg_check_modules(kissfft REQUIRED IMPORTED_TARGET kissfft-float)
 # Debian's OpenVDB has its find module beside the library instead of a package file.
 list(APPEND CMAKE_MODULE_PATH /usr/lib/${CMAKE_LIBRARY_ARCHITECTURE}/cmake/OpenVDB)
 find_package(OpenVDB 10 REQUIRED)
+# The loader looks for each of OpenVDB's 69 000 names in one library after the other, in the order of linking. So
+# OpenVDB comes first. A sanitizer's own library must come first.
+if(NOT OSTEON_SANITIZE)
+  target_link_options(osteon_flags INTERFACE
+    "SHELL:-Wl,--push-state,--as-needed $<TARGET_FILE:OpenVDB::openvdb> -Wl,--pop-state")
+endif()
 
 if(BUILD_TESTING)
   find_package(GTest REQUIRED)

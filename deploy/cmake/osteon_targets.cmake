@@ -113,10 +113,17 @@ function(osteon_test_suites suites)
 endfunction()
 
 # A GoogleTest program. Each of its suites is registered with ctest: a process for each case would take longer to load
-# libraries than to test. LABELS name the kind of test.
+# libraries than to test. LABELS name the kind of test. deploy/nightly builds NIGHTLY
+# tests with the target nightly_tests and runs them with `ctest -C nightly`. deploy/test does neither.
 function(osteon_test name)
-  cmake_parse_arguments(arg "" "TIMEOUT" "SOURCES;DEPS;LABELS" ${ARGN})
+  cmake_parse_arguments(arg "NIGHTLY" "TIMEOUT" "SOURCES;DEPS;LABELS" ${ARGN})
   add_executable(${name} ${arg_SOURCES})
+  set(only)
+  if(arg_NIGHTLY)
+    set_target_properties(${name} PROPERTIES EXCLUDE_FROM_ALL ON)
+    add_dependencies(nightly_tests ${name})
+    set(only CONFIGURATIONS nightly)
+  endif()
   target_link_libraries(${name} PRIVATE osteon_flags osteon_test_flags ${arg_DEPS} GTest::gmock_main)
   osteon_precompile_test(${name})
   if(NOT arg_TIMEOUT)
@@ -130,12 +137,12 @@ function(osteon_test name)
   osteon_test_suites(suites ${arg_SOURCES})
   set(tests)
   foreach(suite IN LISTS suites)
-    add_test(NAME ${name}.${suite} COMMAND ${name} --gtest_filter=${suite}.*:*/${suite}.*)
+    add_test(NAME ${name}.${suite} COMMAND ${name} --gtest_filter=${suite}.*:*/${suite}.* ${only})
     list(APPEND tests ${name}.${suite})
   endforeach()
   # A program of objects that another target compiled.
   if(NOT tests)
-    add_test(NAME ${name} COMMAND ${name})
+    add_test(NAME ${name} COMMAND ${name} ${only})
     set(tests ${name})
   endif()
   set_tests_properties(${tests} PROPERTIES

@@ -71,7 +71,7 @@ nlohmann::json measured(const fs::path& folder, const char* mesh) {
   found["femur"] = whole({}, {}, folder);
   found["tibia"] = whole({.kind = "tibia", .side = phantoms::Side::right}, both, folder);
   found["knee"] = apart("knee", nullptr, 0, folder);
-  // The head needs a seed of its own, see PhantomBoneCt.AHipComesBackAsTwoBones.
+  // The head needs a seed of its own, see PhantomJointsCt.AHipComesBackAsTwoBones.
   found["hip"] = apart("hip", "head centre", 2, folder);
   found["force_percent"] = value_of(haptic::test::drill_phantom_and_scan(folder / "drilled")).difference_percent;
   if (mesh != nullptr) found["fit"] = fit(mesh);

@@ -4,7 +4,6 @@
 #include <cstdio>
 #include <fstream>
 #include <nlohmann/json.hpp>
-#include <stdexcept>
 
 #include "common/geometry/mesh_file.hpp"
 #include "common/imaging/calibration.hpp"
@@ -244,53 +243,17 @@ TEST(PhantomProgram, AKneeIsComparedWithItsTruthBoneByBone) {
   EXPECT_NE(named.out.find("  tibia, cortical, by name\n"), std::string::npos) << named.out;
 }
 
-test::PhantomAgreement agreement_of(const phantoms::BoneRecipe& recipe, const CtOptions& options) {
-  const auto bone = phantoms::make_bone(recipe);
-  if (!bone) throw std::runtime_error(bone.error().message);
+TEST(PhantomBoneCt, AFemurComesBackFromThickTiltedNoisySlices) {
+  const auto femur = phantoms::make_bone({});
+  ASSERT_TRUE(femur) << femur.error().message;
   const test::TempDir folder;
-  const auto found = test::agreement_of_scan(**bone, options, folder.path());
-  if (!found) throw std::runtime_error(found.error().message);
+  const auto found = test::agreement_of_scan(**femur, {}, folder.path());
+  ASSERT_TRUE(found) << found.error().message;
   std::printf("[          ] Dice %.4f, density of cortex %+.1f %%, of cancellous bone %+.1f %%\n", found->dice,
               found->cortical_percent, found->cancellous_percent);
-  return *found;
-}
-
-TEST(PhantomBoneCt, AFemurComesBackFromThickTiltedNoisySlices) {
-  const test::PhantomAgreement agreement = agreement_of({}, {});
-  EXPECT_GE(agreement.dice, 0.97);
-  EXPECT_NEAR(agreement.cortical_percent, 0.0, 3.0);
-  EXPECT_NEAR(agreement.cancellous_percent, 0.0, 5.0);
-}
-
-// The cortex of a fibula is as thin as a slice is thick, so its density is not asked for.
-TEST(PhantomBoneCt, ATibiaAndItsFibulaComeBackAsTwoBones) {
-  CtOptions options;
-  options.keep = {1, 2};
-  EXPECT_GE(agreement_of({.kind = "tibia", .side = phantoms::Side::right}, options).dice, 0.97);
-}
-
-void expect_back_apart(const phantoms::PhantomBone& joint, const std::vector<test::BoneSeed>& more = {}) {
-  const test::TempDir folder;
-  const auto found = test::dice_of_bones(joint, more, folder.path());
-  ASSERT_TRUE(found) << found.error().message;
-  EXPECT_EQ(found->size(), joint.names().size());
-  for (const auto& [bone, dice] : *found) {
-    std::printf("[          ] %s: Dice %.4f\n", bone.c_str(), dice);
-    EXPECT_GE(dice, 0.95) << bone;
-  }
-}
-
-TEST(PhantomBoneCt, AKneeComesBackAsFourBones) {
-  const auto knee = phantoms::make_bone({.kind = "knee"});
-  ASSERT_TRUE(knee) << knee.error().message;
-  expect_back_apart(**knee);
-}
-
-// In slices this thick, the import divides the femur at its neck and not at the joint, so the head needs its own seed.
-TEST(PhantomBoneCt, AHipComesBackAsTwoBones) {
-  const auto hip = phantoms::make_bone({.kind = "hip"});
-  ASSERT_TRUE(hip) << hip.error().message;
-  expect_back_apart(**hip, {{phantoms::point_of(**hip, "head centre"), 2}});
+  EXPECT_GE(found->dice, 0.97);
+  EXPECT_NEAR(found->cortical_percent, 0.0, 3.0);
+  EXPECT_NEAR(found->cancellous_percent, 0.0, 5.0);
 }
 
 }  // namespace
