@@ -547,6 +547,29 @@ TEST_F(WindowTest, ClosingInTheMiddleOfACutEndsAllAndKeepsTheCut) {
   EXPECT_TRUE(until([&] { return view_->surface_shown() && cut(); })) << problem();
 }
 
+// The server is stopped while it owes answers: to the marks before pushes, and to the pings of the panel.
+TEST_F(WindowTest, AServerThatHangsHoldsTheClosingForTwoSecondsAndLosesNothing) {
+  open();
+  drill();
+  release(middle());
+  ASSERT_TRUE(until([&] { return !view_->pointer().pushing() && cut(); })) << problem();
+  const auto servers = children("osteon-server");
+  ASSERT_EQ(servers.size(), 1u);
+  ASSERT_EQ(::kill(servers[0], SIGSTOP), 0);
+  trigger("connections");
+  QTest::qWait(500);
+  const auto began = std::chrono::steady_clock::now();
+  window_->close();
+  EXPECT_LT(std::chrono::steady_clock::now() - began, 3s) << "of which the programs may take two";
+  EXPECT_TRUE(children("osteon-server").empty());
+  EXPECT_TRUE(children("osteon-haptic").empty());
+  const auto session = recent_entries().front().session;
+  begin();
+  open(session);
+  EXPECT_TRUE(until([&] { return cut(); })) << problem();
+  window_->findChild<QDockWidget*>("connection_panel")->hide();
+}
+
 TEST_F(WindowTest, ACaseInOneFileIsSavedOpenedAndDropped) {
   const std::filesystem::path file = desk_->temp().path() / "My block.osteon";
   open();
