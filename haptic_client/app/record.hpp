@@ -22,6 +22,7 @@ struct TickRow {
   LoopReport report;
   DeviceReading reading;
   double commanded_rpm = 0;
+  bool empty_hand = false;
   DeviceOutput rendered;  // device frame
   // The tool was taken up in this tick: where, and the mapping of the device to the bone's frame from then on.
   bool take_up = false;

@@ -286,6 +286,7 @@ SessionTick PointerSession::tick(const Patch& patch, RoomLink room, int periods,
   result.order.rotation = rotation_;
   result.reading = reading;
   result.commanded_rpm = result.order.spindle_rpm = rpm;
+  result.empty_hand = command_.empty_hand;
   result.report = last_ = loop_.tick(input, patch, guides);
   device_.write({result.report.device.force_n, result.report.device.torque_nmm});
 

@@ -22,6 +22,7 @@ struct PointerCommand {
   double push_n = 10.0, spindle = 0.0, spindle_rpm = 0.0;
   int tool = 0;  // index in the plan's tools
   bool irrigation = false, suction = false;
+  bool empty_hand = true;  // until a message says that it holds something
 };
 
 // What the hand and the tool do; bone frame.

@@ -11,6 +11,7 @@ struct SessionTick {
   DeviceReading reading;  // input of the loop
   double commanded_rpm = 0;
   LoopReport report;
+  bool empty_hand = false;  // it holds no tool: others see none
 };
 
 // A session of one tool operator. In each tick the operator moves the handle, and the loop responds.

@@ -98,6 +98,27 @@ TEST_F(WindowTest, WheelSpaceAndShiftSetPushSpindleAndFineMotion) {
   EXPECT_TRUE(window_->statusBar()->currentMessage().startsWith("Choose a tool"));
 }
 
+// The haptic client holds a tool from its start on. As long as the user has none, nobody sees it.
+TEST_F(WindowTest, AnEmptyHandIsNotDrawn) {
+  open();
+  const auto holds = [&](const std::string& tool) {
+    const auto states = view_->updater()->states();
+    return !states.empty() && states.front().tool_name == tool;
+  };
+  ASSERT_TRUE(until([&] { return holds(""); })) << problem();
+  EXPECT_EQ(label("position"), "");
+  click_tool("drill");
+  hover(middle());
+  EXPECT_TRUE(until([&] { return holds("drill-3.2") && label("position").startsWith("Tip"); })) << problem();
+  trigger("put_down");
+  EXPECT_TRUE(until([&] { return holds("") && label("position").isEmpty(); })) << problem();
+  // An item that waits for its place is in no hand either.
+  click_tool("drill");
+  EXPECT_TRUE(until([&] { return holds("drill-3.2"); })) << problem();
+  window_->findChild<QToolButton*>("pin")->defaultAction()->trigger();
+  EXPECT_TRUE(until([&] { return holds(""); })) << problem();
+}
+
 // How often the window is put together anew, for the picture or for any panel.
 class WindowUpdates : public QObject {
  public:

@@ -562,14 +562,18 @@ void MainWindow::refresh_gauges() {
     const CuttingState& state = updater->states().front();
     gauges_->show(state, hand, 1e-3 * static_cast<double>(clock_.elapsed()));
     show_other_hand(state);
-    const Vec3& at = state.pose_bone_tool.position_mm;
+  }
+  const CuttingState* held = updater != nullptr ? updater->held_tool() : nullptr;
+  if (held != nullptr) {
+    const Vec3& at = held->pose_bone_tool.position_mm;
     position_->setText(tr("Tip %1, %2, %3 mm")
                            .arg(QLocale().toString(at.x(), 'f', 1), QLocale().toString(at.y(), 'f', 1),
                                 QLocale().toString(at.z(), 'f', 1)));
+  } else if (!position_->text().isEmpty()) {
+    position_->clear();
   }
   risk_->set_plan(updater != nullptr ? updater->plan() : nullptr);
-  const bool any = updater != nullptr && !updater->states().empty();
-  risk_->show_tip(any ? std::optional(updater->states().front().pose_bone_tool.position_mm) : std::nullopt);
+  risk_->show_tip(held != nullptr ? std::optional(held->pose_bone_tool.position_mm) : std::nullopt);
   if (const QString fault = QString::fromStdString(view_->take_plan_fault()); !fault.isEmpty()) say(fault);
   if (pointer_)
     device_->setText(!pointer_->connected() ? tr("The pointer's device is away")

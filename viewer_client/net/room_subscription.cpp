@@ -393,7 +393,7 @@ void RoomSubscription::Impl::read_cutting() {
       std::vector<BodyId> bodies;
       for (const std::uint32_t body : message.bodies()) bodies.push_back(BodyId{body});
       bool missed = false;
-      for (const CuttingState& state : states) missed |= known.miss(state.tool_name);
+      for (const CuttingState& state : states) missed |= !state.tool_name.empty() && known.miss(state.tool_name);
       for (const SceneItem& item : items) missed |= known.miss(item.tool);
       if (missed) fetch_tools({channel, &requests}, request.author(), known);
       render_queue.put_states(std::move(states), std::move(items), std::move(bodies));

@@ -239,6 +239,7 @@ void PeopleOverlay::show_names(std::map<AuthorId, std::string> names) { impl_->n
 void PeopleOverlay::show_tools(std::span<const CuttingState> states) {
   std::map<AuthorId, Impl::Tool> shown;
   for (const CuttingState& state : states) {
+    if (state.tool_name.empty()) continue;  // an empty hand is not seen
     auto held = impl_->tools.extract(state.author);
     Impl::Tool tool = held.empty() ? Impl::Tool{{}, text_actor(kNameText, kName)} : held.mapped();
     if (held.empty()) impl_->above->AddActor2D(tool.name);

@@ -33,7 +33,7 @@ PointerInput an_input() {
   input.target_mm = {1.25, -20.5, 300.0};
   input.rotation_bone_tool = Eigen::Quaterniond(0.5, -0.5, 0.5, 0.5);
   input.on_bone = input.push = input.fine = true;
-  input.irrigation = input.suction = true;
+  input.irrigation = input.suction = input.empty_hand = true;
   input.push_n = 29.0;
   input.spindle = 0.75;
   input.spindle_rpm = 1200.0;
