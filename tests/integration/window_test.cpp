@@ -496,6 +496,31 @@ TEST_F(WindowTest, TheTourFollowsWhatIsDone) {
   EXPECT_FALSE(window_->findChild<Tour*>("tour")->isVisible());
 }
 
+TEST_F(WindowTest, TheTourBeginsWithWhatIsStillToBeDone) {
+  auto* tour = window_->findChild<Tour*>("tour");
+  trigger("tour_again");
+  EXPECT_EQ(tour->accessibleName(), "Step 1 of 5");
+  // The card covers a part of the list that it is about, and nothing of the list beside it.
+  const auto place = [&](const char* name) {
+    const auto* part = window_->findChild<QWidget*>(name);
+    return QRect(part->mapTo(window_.get(), QPoint(0, 0)), part->size());
+  };
+  EXPECT_TRUE(place("examples").contains(tour->geometry()));
+  EXPECT_FALSE(place("recent").intersects(tour->geometry()));
+  tour->end();
+  open();
+  trigger("tour_again");
+  EXPECT_EQ(tour->accessibleName(), "Step 2 of 5");
+  tour->end();
+  click_tool("drill");
+  trigger("tour_again");
+  EXPECT_EQ(tour->accessibleName(), "Step 3 of 5");
+  tour->end();
+  trigger("start_page");
+  trigger("tour_again");
+  EXPECT_EQ(tour->accessibleName(), "Step 1 of 5");
+}
+
 TEST_F(WindowTest, TheTourIsLedAndEndedByTheKeyboard) {
   auto* tour = window_->findChild<Tour*>("tour");
   trigger("tour_again");

@@ -534,6 +534,12 @@ void MainWindow::show_help() {
   QMessageBox::information(this, tr("How to hold a tool"), text);
 }
 
+// Who watches can do no step but the first.
+TourStep MainWindow::next_step() const {
+  if (!room_ || !room_->joined() || watching_) return TourStep::open;
+  return view_->holding() ? TourStep::push : TourStep::take;
+}
+
 void MainWindow::follow_pad() {
   if (!pad_) return;
   PadFeel feel;

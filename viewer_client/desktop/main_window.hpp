@@ -36,6 +36,7 @@ class StartPage;
 class SurgeryToolBar;
 class Tour;
 class ViewOptions;
+enum class TourStep : int;
 struct ConnectionState;
 struct CuttingState;
 
@@ -124,6 +125,8 @@ class MainWindow : public QMainWindow {
   void mark_moment();
   void save_picture();
   void show_help();
+  // The step of the tour that the user has still to do.
+  [[nodiscard]] TourStep next_step() const;
   void follow_pad();
   void refresh_gauges();
   void show_other_hand(const CuttingState& state);
