@@ -115,6 +115,7 @@ void HapticWorker::fill_row(const SessionTick& now, bool idle, std::int64_t woke
   row_.reading = now.reading;
   row_.commanded_rpm = now.commanded_rpm;
   row_.empty_hand = now.empty_hand;
+  row_.pointer_source = now.pointer_source;
   row_.rendered = {now.report.device.force_n, now.report.device.torque_nmm};
   row_.take_up = now.order.take_up;
   if (!row_.take_up) return;

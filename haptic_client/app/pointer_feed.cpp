@@ -90,7 +90,8 @@ void PointerFeed::command(const PointerInput& input) {
              .tool = tool_,
              .irrigation = input.irrigation,
              .suction = input.suction,
-             .empty_hand = input.empty_hand};
+             .empty_hand = input.empty_hand,
+             .source = input.source};
   exchange_.commands.publish();
 }
 

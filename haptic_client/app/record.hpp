@@ -23,7 +23,8 @@ struct TickRow {
   DeviceReading reading;
   double commanded_rpm = 0;
   bool empty_hand = false;
-  DeviceOutput rendered;  // device frame
+  std::uint8_t pointer_source = 0;  // as SessionTick has it
+  DeviceOutput rendered;            // device frame
   // The tool was taken up in this tick: where, and the mapping of the device to the bone's frame from then on.
   bool take_up = false;
   Pose taken_up_at;  // bone frame
