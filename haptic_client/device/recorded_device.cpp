@@ -315,6 +315,7 @@ void read_pointer(Reader& reader, RecordedSession& session) {
   const auto in_hand = reader.enumerator(recording::kPhase, "free_hand");
   for (std::size_t i = 0; i < rows && reader.ok(); ++i) {
     if (!(rpm[i] >= 0.0 && rpm[i] <= kMostRpm)) reader.damaged(recording::kCommandedRpm);
+    if (session.tools.empty()) reader.damaged(recording::kTools);
     session.pointer.push_back({.commanded_rpm = rpm[i], .in_hand = phase[i] == in_hand, .source = source[i]});
   }
   read_take_ups(reader, session);
@@ -362,6 +363,9 @@ Result<void> check_played(const RecordedSession& recorded, std::string_view name
   if (recorded.case_hash != case_hash)
     return failure(ErrorCode::invalid_input, is_of + "another bone, \"" + recorded.case_title + "\" (case " +
                                                  recorded.case_hash.substr(0, 12) + "); join a room on that case");
+  if (recorded.of_pointer() && !tools.empty() && recorded.tools.front() != tools.front())
+    return failure(ErrorCode::invalid_input, is_of + "a pointer's hand that began with " + recorded.tools.front() +
+                                                 "; give --tool " + recorded.tools.front());
   const auto list = [](const std::vector<std::string>& names) {
     std::string text;
     for (const std::string& one : names) text += (text.empty() ? "" : ", ") + one;

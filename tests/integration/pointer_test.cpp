@@ -297,6 +297,7 @@ TEST_F(PointerInRoom, ItsRecordingIsPlayedAgainInAnotherRoom) {
   ASSERT_EQ(code, 0) << err;
   // Real threads deliver the patches, so cuts agree in size but not bit by bit.
   EXPECT_NEAR(read_json(stage / "again.json")["removed_mm3"].get<double>(), removed_mm3, 0.03 * removed_mm3);
+  EXPECT_THAT(play({"--tool", "burr-round-5"}).second, testing::HasSubstr("give --tool drill-3.2"));
   std::ofstream(stage / "plan.json") << R"({"steps": [{"action": "wait", "seconds": 0.1}]})";
   EXPECT_THAT(play({"--plan", stage / "plan.json"}).second,
               testing::HasSubstr("leave out --plan and give the --tool that it began with, drill-3.2"));

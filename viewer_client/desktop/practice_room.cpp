@@ -19,7 +19,7 @@ constexpr int kAddressPeriod_ms = 30;
 constexpr int kRestart_ms = 300;
 // What ends as it should needs a second for all. A program that hangs must not hold the window, and what it
 // acknowledged is on the disk: the journal syncs before it acknowledges. So it is killed.
-constexpr std::chrono::milliseconds kClientsEnd{1300}, kAllEnd{1900};
+constexpr std::chrono::milliseconds kClientsEnd{1200}, kAllEnd{1700};
 
 }  // namespace
 
