@@ -129,7 +129,7 @@ std::vector<json> no_number(double least, double most) {
 }
 
 // Fields that an older window does not send.
-const std::set<std::string> kOptional{"irrigation", "suction"};
+const std::set<std::string> kOptional{"irrigation", "suction", "empty_hand"};
 
 // Each value alone, and the absence of a field that must be there, is refused with a sentence that names the field.
 void expect_each_refused(const std::string& valid, const Wrong& wrong, Refusal refusal) {
@@ -158,6 +158,7 @@ TEST(PointerMessage, EachFieldOfTheWindowIsChecked) {
                        {"on_bone", kNoBool},
                        {"irrigation", kNoBool},
                        {"suction", kNoBool},
+                       {"empty_hand", kNoBool},
                        {"push", kNoBool},
                        {"fine", kNoBool},
                        {"push_n", no_number(kLeastPush_n, kMostPush_n)},
