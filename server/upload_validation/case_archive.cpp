@@ -85,12 +85,13 @@ class Unpacker {
                                                  std::to_string(std::size(kCaseFiles)) + " files");
       if (Result<void> taken = take(entry); !taken) return tl::unexpected(taken.error());
     }
-    // The library finds the entries by the list at the end. It takes a damaged list for a shorter one.
-    if (entries == 0 || (said_ && *said_ != entries))
-      return bad("is not a sound zip archive (its list of files is damaged); copy it or pack the case again");
-    for (const std::string_view file : std::span(kCaseFiles).first(kNeededCaseFiles))
-      if (!files_.contains(std::string(file)))
-        return bad("has no " + std::string(file) + "; pack the whole folder of a case");
+    for (const std::string_view file : std::span(kCaseFiles).first(kNeededCaseFiles)) {
+      if (files_.contains(std::string(file))) continue;
+      // The library finds the entries by the list at the end. It takes a damaged list for a shorter one.
+      if (entries == 0 || (said_ && *said_ != entries))
+        return bad("is not a sound zip archive (its list of files is damaged); copy it or pack the case again");
+      return bad("has no " + std::string(file) + "; pack the whole folder of a case");
+    }
     return files_;
   }
 
