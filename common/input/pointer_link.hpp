@@ -38,6 +38,7 @@ struct PointerInput {
   double spindle = 0.0;      // share of the spindle's speed, 0 to 1
   double spindle_rpm = 0.0;  // its full speed; 0: the tool's own
   std::string tool{};        // that the hand is to hold; empty: no change
+  bool empty_hand = false;   // the hand holds no tool, and nobody sees one; off in a message without this field
   PointerSource source = PointerSource::mouse;
   friend bool operator==(const PointerInput&, const PointerInput&) = default;
 };

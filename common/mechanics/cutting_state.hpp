@@ -15,7 +15,7 @@ struct CuttingState {
   std::uint64_t state_seq = 0;
   Pose pose_bone_tool;    // the proxy
   Pose pose_bone_device;  // the user's hand
-  std::string tool_name;
+  std::string tool_name;  // empty: the hand holds no tool
   double spindle_rpm = 0;
   double feed_mm_per_s = 0;
   double density_g_cm3 = 0;              // engaged-area weighted

@@ -360,6 +360,11 @@ Result<Case> Case::build(CaseInfo info, const DenseVolume<float>& surface_mm, co
 
 Result<Case> Case::load(const std::filesystem::path& folder) {
   const auto file = folder / kInfoFile;
+  if (std::filesystem::is_regular_file(folder))
+    return bad_input(folder.string() +
+                     " is a file, and the folder of a case is needed; make it of a case in one file with: "
+                     "osteon-import unpack " +
+                     folder.string() + " --out FOLDER");
   if (!std::filesystem::is_directory(folder))
     return failure(ErrorCode::not_found,
                    "there is no case folder " + folder.string() + "; make one with osteon-import");

@@ -46,8 +46,11 @@ int fault_of_alert(int alert) {
 // Finds out why a connection failed.
 class Diagnosis {
  public:
-  Diagnosis(const std::string& address, const ClientCredentials& credentials)
-      : address_(address), host_(address.substr(0, address.rfind(':'))), folder_(credentials.certificates) {
+  Diagnosis(const std::string& address, const ClientCredentials& credentials, const std::function<bool()>& stop)
+      : address_(address),
+        host_(address.substr(0, address.rfind(':'))),
+        folder_(credentials.certificates),
+        stop_(stop) {
     if (host_.starts_with('[') && host_.ends_with(']')) host_ = host_.substr(1, host_.size() - 2);
   }
 
@@ -57,7 +60,7 @@ class Diagnosis {
       if (!read) return {read.error(), true};
       files_ = *read;
     }
-    probe_ = probe_tls(host_, address_.substr(address_.rfind(':') + 1), files_, kPatience);
+    probe_ = probe_tls(host_, address_.substr(address_.rfind(':') + 1), files_, kPatience, stop_);
     switch (probe_.reached) {
       case Reached::nothing:
         return for_now("the name " + host_ + " has no address here (" + probe_.system +
@@ -210,14 +213,16 @@ class Diagnosis {
   const std::string address_;
   std::string host_;
   const std::filesystem::path folder_;
+  const std::function<bool()>& stop_;
   ProbeFiles files_;
   Probe probe_;
 };
 
 }  // namespace
 
-ConnectionFault connection_fault(const std::string& address, const ClientCredentials& credentials) {
-  return Diagnosis(address, credentials).find();
+ConnectionFault connection_fault(const std::string& address, const ClientCredentials& credentials,
+                                 const std::function<bool()>& stop) {
+  return Diagnosis(address, credentials, stop).find();
 }
 
 }  // namespace osteon::wire

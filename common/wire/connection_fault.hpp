@@ -1,6 +1,6 @@
 // Finds out why a client could not connect to a server, by one more connection.
 #pragma once
-#include <chrono>
+#include <functional>
 #include <string>
 
 #include "common/core/result.hpp"
@@ -13,7 +13,9 @@ struct ConnectionFault {
   bool lasts = false;  // waiting does not help
 };
 // `address`: HOST:PORT, where a connection with `credentials` has just failed. Takes at most three seconds. Sends no
-// call and no ticket. deploy/docs/troubleshooting.md lists the sentences.
-[[nodiscard]] ConnectionFault connection_fault(const std::string& address, const ClientCredentials& credentials);
+// call and no ticket. deploy/docs/troubleshooting.md lists the sentences. When `stop` returns true, it returns soon,
+// with what it knows by then.
+[[nodiscard]] ConnectionFault connection_fault(const std::string& address, const ClientCredentials& credentials,
+                                               const std::function<bool()>& stop = {});
 
 }  // namespace osteon::wire

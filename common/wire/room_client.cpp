@@ -158,7 +158,8 @@ Result<std::shared_ptr<grpc::Channel>> reach(const std::string& address, const s
     if (!is_over && !has_failed) continue;
     // At the first failure and at the end, so that nobody waits if waiting does not help.
     has_looked = true;
-    ConnectionFault fault = connection_fault(address, credentials);
+    ConnectionFault fault = connection_fault(address, credentials, stop);
+    if (stop && stop()) continue;
     if (is_over || fault.lasts) return tl::unexpected(std::move(fault.error));
   }
   return channel;
@@ -172,11 +173,31 @@ v1::JoinRequest request_of(ClientKind kind) {
   return request;
 }
 
+// Looks in short intervals whether the caller stops. Then the call is cancelled.
+grpc::Status answer_of_join(const std::shared_ptr<grpc::Channel>& channel, const v1::JoinRequest& request,
+                            grpc::ClientContext& context, v1::JoinResponse& response,
+                            const std::function<bool()>& stop) {
+  grpc::CompletionQueue queue;
+  grpc::Status status;
+  const auto stub = v1::RoomService::NewStub(channel);
+  const auto call = stub->AsyncJoin(&context, request, &queue);
+  call->Finish(&response, &status, nullptr);
+  void* tag = nullptr;
+  bool is_ok = false;
+  while (queue.AsyncNext(&tag, &is_ok, std::chrono::system_clock::now() + 50ms) ==
+         grpc::CompletionQueue::NextStatus::TIMEOUT)
+    if (stop && stop()) context.TryCancel();
+  queue.Shutdown();
+  while (queue.Next(&tag, &is_ok)) {
+  }
+  return status;
+}
+
 // Joins over `room`'s channel. `server` is for messages.
 Result<JoinedRoom> ask_to_join(JoinedRoom room, const v1::JoinRequest& request, const std::string& server,
-                               grpc::ClientContext& context) {
+                               grpc::ClientContext& context, const std::function<bool()>& stop = {}) {
   v1::JoinResponse response;
-  const grpc::Status status = v1::RoomService::NewStub(room.channel)->Join(&context, request, &response);
+  const grpc::Status status = answer_of_join(room.channel, request, context, response, stop);
   if (!status.ok()) return tl::unexpected(error_of(status, server));
 
   const Result<Digest> hash = digest_from_wire(response.case_hash());
@@ -216,7 +237,9 @@ Result<JoinedRoom> join_room(const std::string& address, ClientKind kind, const 
   request.set_name(name);
   grpc::ClientContext context;
   context.set_deadline(std::chrono::system_clock::now() + kAnswerTime);
-  Result<JoinedRoom> joined = ask_to_join(std::move(room), request, "the program at " + address, context);
+  Result<JoinedRoom> joined = ask_to_join(std::move(room), request, "the program at " + address, context, stop);
+  if (!joined && stop && stop())
+    return failure(ErrorCode::cancelled, "stopped before the server at " + address + " answered");
   // More rooms may be opened later. Name this one in further calls.
   if (joined) calls_to->set(joined->name);
   return joined;

@@ -26,6 +26,10 @@ using Clock = std::chrono::steady_clock;
 using namespace std::chrono_literals;
 
 constexpr std::size_t kFirstBytes = 16;
+constexpr auto kStopPeriod = 50ms;  // between two looks whether the caller has stopped
+
+using Stop = std::function<bool()>;
+bool has_stopped(const Stop& stop) { return stop && stop(); }
 
 struct Address {
   int family = 0;
@@ -53,12 +57,13 @@ Addresses look_up(const std::string& host, const std::string& port) {
   return addresses;
 }
 
-// The system's resolver has no timeout. After `until` its thread is left to end by itself.
-Addresses look_up_until(const std::string& host, const std::string& port, Clock::time_point until) {
+// The system's resolver has no timeout. After `until`, or a stop, its thread is left to end by itself.
+Addresses look_up_until(const std::string& host, const std::string& port, Clock::time_point until, const Stop& stop) {
   std::packaged_task<Addresses()> task([host, port] { return look_up(host, port); });
   std::future<Addresses> found = task.get_future();
   std::thread(std::move(task)).detach();
-  if (found.wait_until(until) != std::future_status::ready) return {{}, "the name service does not answer"};
+  while (found.wait_until(std::min(until, Clock::now() + kStopPeriod)) != std::future_status::ready)
+    if (Clock::now() >= until || has_stopped(stop)) return {{}, "the name service does not answer"};
   return found.get();
 }
 
@@ -69,8 +74,8 @@ int milliseconds_until(Clock::time_point until) {
 
 class Socket {
  public:
+  explicit Socket(const Stop& stop) : stop_(stop) {}
   ~Socket() { close(); }
-  Socket() = default;
   Socket(const Socket&) = delete;
   Socket& operator=(const Socket&) = delete;
 
@@ -106,12 +111,15 @@ class Socket {
  private:
   bool ready(short what, Clock::time_point until) {
     pollfd one{descriptor_, what, 0};
-    return ::poll(&one, 1, milliseconds_until(until)) > 0;
+    while (::poll(&one, 1, milliseconds_until(std::min(until, Clock::now() + kStopPeriod))) <= 0)
+      if (Clock::now() >= until || has_stopped(stop_)) return false;
+    return true;
   }
   void close() {
     if (descriptor_ >= 0) ::close(descriptor_);
     descriptor_ = -1;
   }
+  const Stop& stop_;
   int descriptor_ = -1;
 };
 
@@ -235,14 +243,14 @@ class Tls {
 }  // namespace
 
 Probe probe_tls(const std::string& host, const std::string& port, const ProbeFiles& files,
-                std::chrono::milliseconds patience) {
+                std::chrono::milliseconds patience, const Stop& stop) {
   Probe probe;
   const auto until = Clock::now() + patience;
-  const Addresses addresses = look_up_until(host, port, until);
+  const Addresses addresses = look_up_until(host, port, until, stop);
   probe.system = addresses.why;
   if (addresses.all.empty()) return probe;
   probe.reached = Probe::Reached::name;
-  Socket socket;
+  Socket socket(stop);
   if (!connect(socket, addresses.all, until, probe)) return probe;
   probe = {};
   probe.reached = Probe::Reached::machine;

@@ -1,6 +1,7 @@
 // Makes one connection to find out how far a connection gets. It sends no call and no ticket.
 #pragma once
 #include <chrono>
+#include <functional>
 #include <string>
 
 #include "common/wire/x509.hpp"
@@ -34,8 +35,8 @@ struct Probe {
 };
 
 // `host`: a name or an address, without brackets. Takes at most `patience`, whatever the other end does. Checks the
-// server's certificate before it shows the client's.
+// server's certificate before it shows the client's. `stop` is asked while it waits. True: nothing more is waited for.
 [[nodiscard]] Probe probe_tls(const std::string& host, const std::string& port, const ProbeFiles& files,
-                              std::chrono::milliseconds patience);
+                              std::chrono::milliseconds patience, const std::function<bool()>& stop = {});
 
 }  // namespace osteon::wire

@@ -114,6 +114,8 @@ void HapticWorker::fill_row(const SessionTick& now, bool idle, std::int64_t woke
   row_.force_rendered_n = now.report.device.force_n.norm();
   row_.reading = now.reading;
   row_.commanded_rpm = now.commanded_rpm;
+  row_.empty_hand = now.empty_hand;
+  row_.pointer_source = now.pointer_source;
   row_.rendered = {now.report.device.force_n, now.report.device.torque_nmm};
   row_.take_up = now.order.take_up;
   if (!row_.take_up) return;

@@ -81,7 +81,7 @@ void PointerFeed::command(const PointerInput& input) {
   command = {.number = ++number_,
              .target_mm = input.target_mm,
              .rotation = input.rotation_bone_tool,
-             .on_bone = input.on_bone && trouble_.empty(),
+             .on_bone = input.on_bone && trouble_.empty() && !input.empty_hand,
              .push = input.push,
              .fine = input.fine,
              .push_n = input.push_n,
@@ -89,7 +89,9 @@ void PointerFeed::command(const PointerInput& input) {
              .spindle_rpm = input.spindle_rpm,
              .tool = tool_,
              .irrigation = input.irrigation,
-             .suction = input.suction};
+             .suction = input.suction,
+             .empty_hand = input.empty_hand,
+             .source = input.source};
   exchange_.commands.publish();
 }
 

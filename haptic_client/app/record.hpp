@@ -22,7 +22,9 @@ struct TickRow {
   LoopReport report;
   DeviceReading reading;
   double commanded_rpm = 0;
-  DeviceOutput rendered;  // device frame
+  bool empty_hand = false;
+  std::uint8_t pointer_source = 0;  // as SessionTick has it
+  DeviceOutput rendered;            // device frame
   // The tool was taken up in this tick: where, and the mapping of the device to the bone's frame from then on.
   bool take_up = false;
   Pose taken_up_at;  // bone frame

@@ -12,6 +12,7 @@
 #include <type_traits>
 #include <utility>
 
+#include "common/input/pointer_link.hpp"
 #include "haptic_client/device/hdf5_handle.hpp"
 #include "haptic_client/device/recording_layout.hpp"
 
@@ -329,7 +330,7 @@ void RecordFile::Impl::make_columns() {
                                [](const R& r) { return r.report.state_seq; }));
   add(column<float, R>("data/spindle_rpm", "1/min", "", "speed of the spindle",
                        [](const R& r) { return r.report.spindle_rpm; }));
-  add(column<double, R>("data/commanded_rpm", "1/min", "", "speed that the pedal commands",
+  add(column<double, R>(recording::kCommandedRpm, "1/min", "", "speed that the pedal commands",
                         [](const R& r) { return r.commanded_rpm; }));
   add(column<float, R>("data/feed", "mm/s", "", "into bone, along the direction of cutting",
                        [](const R& r) { return r.report.cutting.feed_mm_per_s; }));
@@ -364,7 +365,7 @@ void RecordFile::Impl::make_columns() {
   Names phases;
   for (int i = 0; i <= static_cast<int>(SurgeonPhase::free_hand); ++i)
     phases.values.emplace_back(name(static_cast<SurgeonPhase>(i)), i);
-  add(enumeration<R>("data/phase", "phase of the current step", phases,
+  add(enumeration<R>(recording::kPhase, "phase of the current step", phases,
                      [](const R& r) { return static_cast<int>(r.phase); }));
   add(column<std::uint32_t, R>("data/step", "1", "", "of the plan, from 0", [](const R& r) { return r.step; }));
   add(column<std::uint8_t, R>("data/tool", "1", "", "tool in hand: its index in metadata/tools",
@@ -380,10 +381,16 @@ void RecordFile::Impl::make_columns() {
   add(column<std::uint32_t, R>("data/events", "1", "",
                                "bits: events of the loop in the tick, named in metadata/event_bits",
                                [](const R& r) { return r.report.events; }));
-  add(column<std::uint32_t, R>(recording::kButtons, "1", "", "bits: 1 clutch, 2 spindle, 4 irrigation, 8 suction",
+  add(column<std::uint32_t, R>(recording::kButtons, "1", "",
+                               "bits: 1 clutch, 2 spindle, 4 irrigation, 8 suction, 16 a pointer's hand cuts",
                                [](const R& r) { return r.reading.buttons; }));
   add(column<double, R>(recording::kPedal, "1", "", "of a proportional pedal, 0 to 1",
                         [](const R& r) { return r.reading.pedal; }));
+  Names sources{{{"none", 0}}};
+  for (const std::string_view source : kPointerSources)
+    sources.values.emplace_back(std::string(source), static_cast<int>(sources.values.size()));
+  add(enumeration<R>(recording::kPointerSource, "what leads the hand of the device pointer", sources,
+                     [](const R& r) { return static_cast<int>(r.pointer_source); }));
   add(enumeration<R>(recording::kDeviceStatus, "whether the device works",
                      {{{"ok", 0}, {"warm", 1}, {"fault", 2}, {"absent", 3}}},
                      [](const R& r) { return static_cast<int>(r.reading.status); }));
@@ -395,24 +402,24 @@ void RecordFile::Impl::make_columns() {
 
   using T = TakeUp;
   const auto change = [this](auto&& made) { take_ups.push_back(std::forward<decltype(made)>(made)); };
-  change(column<std::uint64_t, T>("burr_change/row", "1", "", "first row of data with this tool in hand",
+  change(column<std::uint64_t, T>(recording::kTakeUpRow, "1", "", "first row of data with this tool in hand",
                                   [](const T& t) { return t.row; }));
-  change(column<std::uint8_t, T>("burr_change/tool", "1", "", "its index in metadata/tools",
+  change(column<std::uint8_t, T>(recording::kTakeUpTool, "1", "", "its index in metadata/tools",
                                  [](const T& t) { return t.tick.report.tool; }));
   change(column<double, T>("burr_change/burr_size", "mm", "", "diameter of its cutting part",
                            [](const T& t) { return t.diameter_mm; }));
-  change(column<double, T>("burr_change/pose", "mm, mm, mm, 1, 1, 1, 1", kBone, "where it was taken up",
+  change(column<double, T>(recording::kTakeUpPose, "mm, mm, mm, 1, 1, 1, 1", kBone, "where it was taken up",
                            [](const T& t) { return numbers(t.tick.taken_up_at); }));
-  change(column<double, T>("burr_change/view", "1, 1, 1, 1", "bone from device",
+  change(column<double, T>(recording::kTakeUpView, "1, 1, 1, 1", "bone from device",
                            "rotation of the workspace: qx, qy, qz, qw", [](const T& t) {
                              const Eigen::Quaterniond& q = t.tick.mapping.view();
                              return std::array{q.x(), q.y(), q.z(), q.w()};
                            }));
-  change(column<double, T>("burr_change/scale", "1", "", "mm of the tool for each mm of the handle",
+  change(column<double, T>(recording::kTakeUpScale, "1", "", "mm of the tool for each mm of the handle",
                            [](const T& t) { return t.tick.mapping.scale(); }));
-  change(column<double, T>("burr_change/anchor_device", "mm, mm, mm", kDevice, "this position of the handle",
+  change(column<double, T>(recording::kTakeUpDevice, "mm, mm, mm", kDevice, "this position of the handle",
                            [](const T& t) { return numbers(t.tick.mapping.device_mm()); }));
-  change(column<double, T>("burr_change/anchor_bone", "mm, mm, mm", kBone, "is that position of the tip",
+  change(column<double, T>(recording::kTakeUpBone, "mm, mm, mm", kBone, "is that position of the tip",
                            [](const T& t) { return numbers(t.tick.mapping.bone_mm()); }));
   change(column<double, T>("burr_change/time_stamp", "s", "UTC, since 1970-01-01", "when",
                            [](const T& t) { return t.time_s; }));

@@ -125,7 +125,7 @@ CuttingState TelemetryWorker::state_of(const TickRow& row) const {
   state.state_seq = r.state_seq;
   state.pose_bone_tool = r.pose_bone_proxy;
   state.pose_bone_device = r.pose_bone_device;
-  state.tool_name = tool_name(row);
+  if (!row.empty_hand) state.tool_name = tool_name(row);
   state.spindle_rpm = r.spindle_rpm;
   state.feed_mm_per_s = r.cutting.feed_mm_per_s;
   state.density_g_cm3 = r.cutting.density_g_cm3;

@@ -2,6 +2,7 @@
 
 #include "common/runtime/log.hpp"
 #include "haptic_client/app/plan_file.hpp"
+#include "haptic_client/simulation/played_pointer.hpp"
 
 namespace osteon::haptic {
 
@@ -64,6 +65,11 @@ Result<ToolOperator> ToolOperator::make(const ToolOperatorOptions& options, cons
         ErrorCode::invalid_input,
         "--device " + options.device +
             " is held by a person, who needs no plan; leave out --plan and give --tool, or take --device simulated");
+  if (choice.recorded_ && choice.recorded_->session().of_pointer())
+    return failure(ErrorCode::invalid_input, "--device " + options.device +
+                                                 " is of a pointer, whose hand had no plan; leave out --plan and give "
+                                                 "the --tool that it began with, " +
+                                                 choice.recorded_->session().tools.front());
   Result<std::vector<PlanStep>> plan = read_plan(options.plan);
   if (!plan) return tl::unexpected(plan.error());
   choice.plan_ = std::move(*plan);
@@ -118,44 +124,60 @@ Result<ReadyPlan> ToolOperator::ready_on(const Case& bone, const ToolFinder& fin
   return ready;
 }
 
-Result<std::unique_ptr<Session>> ToolOperator::pointed_on(const Case& bone, const ToolBox& tools,
-                                                          const ForceScaling& scaling) {
+Result<ReadyPlan> ToolOperator::pointed_ready_on(const Case& bone, const ToolBox& tools) const {
   std::vector<Tool> known;
   for (const ToolBox::Entry* entry : tools.entries()) known.push_back(entry->tool);
   Result<ReadyPlan> ready = make_pointed_hand(free_, bone, known);
   if (!ready) return failure(ready.error().code, "--tool " + options_.tool + ": " + ready.error().message);
+  return ready;
+}
+
+Result<std::unique_ptr<Session>> ToolOperator::pointed_on(const Case& bone, const ToolBox& tools,
+                                                          const ForceScaling& scaling) {
+  Result<ReadyPlan> ready = pointed_ready_on(bone, tools);
+  if (!ready) return tl::unexpected(ready.error());
   std::vector<std::string> names;
   for (const ToolModel& model : ready->tools) names.push_back(model.tool.name);
   pointer_->set_tools(std::move(names));
   return std::make_unique<PointerSession>(std::move(*ready), pointer_->exchange(), simulated_, scaling);
 }
 
+Result<ForceScaling> ToolOperator::played_on(const Case& bone, const ReadyPlan& ready, ForceScaling scaling) const {
+  const RecordedSession& played = recorded_->session();
+  std::vector<std::string> names;
+  for (const ToolModel& model : ready.tools) names.push_back(model.tool.name);
+  if (Result<void> suits =
+          check_played(played, "--device " + options_.device, to_hex(bone.hash()), names, to_hex(plan_digest(ready)));
+      !suits)
+    return tl::unexpected(suits.error());
+  if (played.start_hash.empty())
+    log::warn("the recording does not say what bone it began on",
+              {{"remedy", "make sure that the room's bone is in the same state as then"}});
+  // The recorded hand reacted to a certain force; another force would not match it.
+  const Result<ForceChoice> choice =
+      find_force_choice(played.force_choice.empty() ? name(ForceChoice::proportional) : played.force_choice);
+  if (!choice) return failure(choice.error().code, "--device " + options_.device + ": " + choice.error().message);
+  if (options_.force_choice && *options_.force_choice != *choice)
+    return failure(ErrorCode::invalid_input, "--device " + options_.device + " was recorded with --force-choice " +
+                                                 std::string(name(*choice)) + "; leave out --force-choice");
+  scaling.choice = *choice;
+  if (*choice == ForceChoice::proportional && scaling.scale == 0.0) scaling.scale = played.force_scale;
+  return scaling;
+}
+
 Result<std::unique_ptr<Session>> ToolOperator::on(const Case& bone, const ToolBox& tools, double force_scale) {
   ForceScaling scaling(force_scale, options_.force_choice.value_or(ForceChoice::proportional));
   if (pointer_) return pointed_on(bone, tools, scaling);
-  Result<ReadyPlan> ready = ready_on(bone, [&](std::string_view name) { return tools.find(name); });
+  const bool of_pointer = recorded_ && recorded_->session().of_pointer();
+  Result<ReadyPlan> ready = of_pointer ? pointed_ready_on(bone, tools)
+                                       : ready_on(bone, [&](std::string_view name) { return tools.find(name); });
   if (!ready) return tl::unexpected(ready.error());
   if (recorded_) {
-    std::vector<std::string> names;
-    for (const ToolModel& model : ready->tools) names.push_back(model.tool.name);
-    if (Result<void> played = check_played(recorded_->session(), "--device " + options_.device, to_hex(bone.hash()),
-                                           names, to_hex(plan_digest(*ready)));
-        !played)
-      return tl::unexpected(played.error());
-    if (recorded_->session().start_hash.empty())
-      log::warn("the recording does not say what bone it began on",
-                {{"remedy", "make sure that the room's bone is in the same state as then"}});
-    // The recorded hand reacted to a certain force; another force would not match it.
-    const RecordedSession& played = recorded_->session();
-    const Result<ForceChoice> choice =
-        find_force_choice(played.force_choice.empty() ? name(ForceChoice::proportional) : played.force_choice);
-    if (!choice) return failure(choice.error().code, "--device " + options_.device + ": " + choice.error().message);
-    if (options_.force_choice && *options_.force_choice != *choice)
-      return failure(ErrorCode::invalid_input, "--device " + options_.device + " was recorded with --force-choice " +
-                                                   std::string(name(*choice)) + "; leave out --force-choice");
-    scaling.choice = *choice;
-    if (*choice == ForceChoice::proportional && scaling.scale == 0.0) scaling.scale = played.force_scale;
+    const Result<ForceScaling> played = played_on(bone, *ready, scaling);
+    if (!played) return tl::unexpected(played.error());
+    scaling = *played;
   }
+  if (of_pointer) return std::make_unique<PlayedPointerSession>(std::move(*ready), *recorded_, scaling);
   if (options_.plan.empty()) {
     HapticDevice& device = person_ ? static_cast<HapticDevice&>(*person_) : *recorded_;
     return std::make_unique<FreeHandSession>(std::move(*ready), device, scaling);

@@ -55,8 +55,12 @@ class ToolOperator {
   Result<void> take_tool();
   // The plan's steps, or those of the person's hand.
   Result<ReadyPlan> ready_on(const Case& bone, const ToolFinder& find) const;
+  // The plan of a person with a pointer: all tools that a hand can hold.
+  Result<ReadyPlan> pointed_ready_on(const Case& bone, const ToolBox& tools) const;
   // The session of a person with a pointer.
   Result<std::unique_ptr<Session>> pointed_on(const Case& bone, const ToolBox& tools, const ForceScaling& scaling);
+  // Checks that a recording suits the bone and the plan. Returns how force was scaled then, unless options say more.
+  Result<ForceScaling> played_on(const Case& bone, const ReadyPlan& ready, ForceScaling scaling) const;
   // Opens a person's devices.
   Result<void> connect(const DeviceNotice& notice);
 

@@ -51,6 +51,7 @@ enum DeviceButton : std::uint32_t {
   // What the other hand does, as long as it is set.
   kIrrigation = 4,
   kSuction = 8,
+  kHandCuts = 16,  // of a pointer's hand: it pushes or draws the tool out, so the tool may cut
 };
 
 // The bits of what the other hand does.

@@ -11,6 +11,8 @@
 namespace osteon::haptic {
 namespace {
 
+constexpr double kMostRpm = 1e6;
+
 // A recording being read, and the message of the first error in it.
 class Reader {
  public:
@@ -103,8 +105,8 @@ class Reader {
   }
 
   // Number of complete rows: those that have their time.
-  std::size_t rows() {
-    const Hdf5Handle dataset = find_dataset(recording::kTime);
+  std::size_t rows(const char* path = recording::kTime) {
+    const Hdf5Handle dataset = find_dataset(path);
     if (!dataset.ok()) return 0;
     const Hdf5Handle space(H5Dget_space(dataset.id()), H5Sclose);
     const hssize_t count = H5Sget_simple_extent_npoints(space.id());
@@ -139,6 +141,20 @@ class Reader {
         (named && H5Tget_size(stored.id()) != sizeof(T)))
       damaged(path);
     return read;
+  }
+
+  // The value of a name in an enumeration.
+  std::optional<std::uint8_t> enumerator(const char* path, const char* name) {
+    const Hdf5Handle dataset = find_dataset(path);
+    if (!dataset.ok()) return {};
+    const Hdf5Handle type(H5Dget_type(dataset.id()), H5Tclose);
+    std::uint8_t value = 0;
+    if (H5Tget_class(type.id()) != H5T_ENUM || H5Tget_size(type.id()) != sizeof value ||
+        H5Tenum_valueof(type.id(), name, &value) < 0) {
+      damaged(path);
+      return {};
+    }
+    return value;
   }
 
   bool wrong(ErrorCode code, const std::string& sentence) {
@@ -244,6 +260,67 @@ void read_rows(Reader& reader, RecordedSession& session) {
   if (!moves) places = {};
 }
 
+void read_take_ups(Reader& reader, RecordedSession& session) {
+  const std::size_t count = reader.rows(recording::kTakeUpRow);
+  if (count == 0) return;
+  const auto rows = reader.values<std::uint64_t>(recording::kTakeUpRow, H5T_NATIVE_UINT64, count, 1);
+  const auto tools = reader.values<std::uint8_t>(recording::kTakeUpTool, H5T_NATIVE_UINT8, count, 1);
+  const auto poses = reader.values<double>(recording::kTakeUpPose, H5T_NATIVE_DOUBLE, count, 7);
+  const auto views = reader.values<double>(recording::kTakeUpView, H5T_NATIVE_DOUBLE, count, 4);
+  const auto scales = reader.values<double>(recording::kTakeUpScale, H5T_NATIVE_DOUBLE, count, 1);
+  const auto devices = reader.values<double>(recording::kTakeUpDevice, H5T_NATIVE_DOUBLE, count, 3);
+  const auto bones = reader.values<double>(recording::kTakeUpBone, H5T_NATIVE_DOUBLE, count, 3);
+  if (!reader.ok()) return;
+  for (std::size_t i = 0; i < count; ++i) {
+    if (rows[i] >= session.pointer.size()) break;  // of a row that is not complete
+    RecordedTakeUp taken{.tool = tools[i],
+                         .pose_bone_tool = pose_of(&poses[7 * i]),
+                         .view = {views[4 * i + 3], views[4 * i], views[4 * i + 1], views[4 * i + 2]},
+                         .scale = scales[i],
+                         .device_mm = Vec3(&devices[3 * i]),
+                         .bone_mm = Vec3(&bones[3 * i])};
+    const bool well = good(taken.pose_bone_tool) && good({Vec3::Zero(), taken.view}) && taken.scale > 0.0 &&
+                      std::isfinite(taken.scale) && taken.device_mm.allFinite() && taken.bone_mm.allFinite() &&
+                      static_cast<std::size_t>(taken.tool) < session.tools.size();
+    if (!well) {
+      reader.wrong(ErrorCode::invalid_input, reader.name() + ": row " + std::to_string(i) +
+                                                 " of burr_change is no tool that was taken up; the file is damaged");
+      return;
+    }
+    session.pointer[rows[i]].take_up = static_cast<int>(session.take_ups.size());
+    session.take_ups.push_back(taken);
+  }
+}
+
+// What the hand of a pointer did besides moving the handle.
+void read_pointer(Reader& reader, RecordedSession& session) {
+  if (!reader.ok() || session.device != recording::kPointer) return;
+  if (!reader.has_dataset(recording::kPointerSource)) {
+    reader.wrong(ErrorCode::unsupported, reader.name() +
+                                             " is of a pointer and does not say when its hand cut, because an older "
+                                             "osteon-haptic wrote it; record it again");
+    return;
+  }
+  const std::size_t rows = reader.rows();
+  if (rows != session.readings.size()) {
+    reader.wrong(ErrorCode::unsupported, reader.name() +
+                                             " is of a pointer and lacks some ticks, so its tool cannot be led as it "
+                                             "was; record it again on a machine with less load");
+    return;
+  }
+  const auto rpm = reader.values<double>(recording::kCommandedRpm, H5T_NATIVE_DOUBLE, rows, 1);
+  const auto phase = reader.values<std::uint8_t>(recording::kPhase, H5T_NATIVE_UINT8, rows, 1);
+  const auto source = reader.values<std::uint8_t>(recording::kPointerSource, H5T_NATIVE_UINT8, rows, 1);
+  if (!reader.ok()) return;
+  const auto in_hand = reader.enumerator(recording::kPhase, "free_hand");
+  for (std::size_t i = 0; i < rows && reader.ok(); ++i) {
+    if (!(rpm[i] >= 0.0 && rpm[i] <= kMostRpm)) reader.damaged(recording::kCommandedRpm);
+    if (session.tools.empty()) reader.damaged(recording::kTools);
+    session.pointer.push_back({.commanded_rpm = rpm[i], .in_hand = phase[i] == in_hand, .source = source[i]});
+  }
+  read_take_ups(reader, session);
+}
+
 }  // namespace
 
 Result<RecordedSession> read_recording(const std::filesystem::path& file) {
@@ -272,6 +349,7 @@ Result<RecordedSession> read_recording(const std::filesystem::path& file) {
   session.info.force_axes = static_cast<int>(reader.number(g, recording::kForceAxes));
   session.info.torque_axes = static_cast<int>(reader.number(g, recording::kTorqueAxes));
   read_rows(reader, session);
+  read_pointer(reader, session);
   if (!reader.ok()) return tl::unexpected(reader.error());
 
   session.start_hash = reader.digits(recording::kStartHash);
@@ -285,6 +363,9 @@ Result<void> check_played(const RecordedSession& recorded, std::string_view name
   if (recorded.case_hash != case_hash)
     return failure(ErrorCode::invalid_input, is_of + "another bone, \"" + recorded.case_title + "\" (case " +
                                                  recorded.case_hash.substr(0, 12) + "); join a room on that case");
+  if (recorded.of_pointer() && !tools.empty() && recorded.tools.front() != tools.front())
+    return failure(ErrorCode::invalid_input, is_of + "a pointer's hand that began with " + recorded.tools.front() +
+                                                 "; give --tool " + recorded.tools.front());
   const auto list = [](const std::vector<std::string>& names) {
     std::string text;
     for (const std::string& one : names) text += (text.empty() ? "" : ", ") + one;
@@ -307,11 +388,16 @@ RecordedDevice::RecordedDevice(std::string name, RecordedSession session)
 
 DeviceReading RecordedDevice::read() noexcept {
   if (!over()) return session_.readings[next_++];
+  ended_ = true;
   DeviceReading last = session_.readings.back();
   last.status = DeviceStatus::absent;
   last.buttons = 0;
   last.pedal = 0.0;
   return last;
+}
+
+const PointerTick* RecordedDevice::pointer_tick() const noexcept {
+  return session_.pointer.empty() || ended_ || next_ == 0 ? nullptr : &session_.pointer[next_ - 1];
 }
 
 const Pose* RecordedDevice::pose_rest_bone() const noexcept {

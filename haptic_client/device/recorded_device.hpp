@@ -11,6 +11,23 @@
 
 namespace osteon::haptic {
 
+// What the recording of a pointer's hand says of a tick, beside the reading.
+struct PointerTick {
+  double commanded_rpm = 0;
+  bool in_hand = false;  // a tool was taken up
+  int take_up = -1;      // index in RecordedSession::take_ups; -1: none in this tick
+  std::uint8_t source = 0;
+};
+
+// A tool was taken up: which one, where, and the parameters of the mapping from the device to the bone from then on.
+struct RecordedTakeUp {
+  int tool = 0;
+  Pose pose_bone_tool;
+  Eigen::Quaterniond view = Eigen::Quaterniond::Identity();
+  double scale = 1;
+  Vec3 device_mm = Vec3::Zero(), bone_mm = Vec3::Zero();
+};
+
 // What a recording says about its session.
 struct RecordedSession {
   std::string device, device_model;
@@ -26,6 +43,10 @@ struct RecordedSession {
   std::vector<DeviceReading> readings;  // one for each tick from the first row on; a lost row repeats the one before
   // For each reading: the bone's pose relative to its rest pose. Empty: it never moved, or the recording does not say.
   std::vector<Pose> pose_rest_bone;
+  // For each reading of a pointer's recording. Empty: of another device.
+  std::vector<PointerTick> pointer;
+  std::vector<RecordedTakeUp> take_ups;
+  [[nodiscard]] bool of_pointer() const noexcept { return !pointer.empty(); }
 };
 
 // Whether a recording can be played in a session. Its handle makes sense only with the same bone, tools and plan.
@@ -36,7 +57,8 @@ struct RecordedSession {
 
 // Reads a recording, as far as it is complete. It may still be growing, or its writer may have been killed. Errors:
 // not_found (no such file), invalid_input (no HDF5 file, no recording, a dataset missing or of the wrong kind, no row,
-// a value that is not a number), unsupported (another version of the format).
+// a value that is not a number), unsupported (another version of the format; a pointer's recording of before, or one
+// that lacks ticks, which does not hold what its playback needs).
 [[nodiscard]] Result<RecordedSession> read_recording(const std::filesystem::path& file);
 
 class RecordedDevice final : public HapticDevice {
@@ -50,6 +72,8 @@ class RecordedDevice final : public HapticDevice {
   [[nodiscard]] DeviceReading read() noexcept override;
   [[nodiscard]] const Pose* pose_rest_bone() const noexcept override;
   void write(const DeviceOutput&) noexcept override {}
+  // [haptic] Of the reading that read() gave last. Null: it is not the recording of a pointer, or it is over.
+  [[nodiscard]] const PointerTick* pointer_tick() const noexcept;
 
   [[nodiscard]] const RecordedSession& session() const { return session_; }
   [[nodiscard]] bool over() const noexcept override { return next_ >= session_.readings.size(); }
@@ -58,6 +82,7 @@ class RecordedDevice final : public HapticDevice {
   std::string name_;
   RecordedSession session_;
   std::size_t next_ = 0;  // haptic thread
+  bool ended_ = false;    // haptic thread; read() has given more than there is
 };
 
 // Whether the room's bone is as it was when the recording began. On other bone, the recorded handle moves through air

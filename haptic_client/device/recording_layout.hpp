@@ -26,10 +26,25 @@ inline constexpr const char* kButtons = "data/buttons";
 inline constexpr const char* kPedal = "data/pedal";
 inline constexpr const char* kDeviceStatus = "data/device_status";
 inline constexpr const char* kCalibration = "data/calibration";
+inline constexpr const char* kCommandedRpm = "data/commanded_rpm";
+inline constexpr const char* kPhase = "data/phase";
+// What leads a pointer's hand: 0 no pointer, then the PointerSources. In older recordings it is missing, and so is the
+// bit of data/buttons that says when the hand cuts.
+inline constexpr const char* kPointerSource = "data/pointer_source";
+
+// A row for each time that a tool was taken up.
+inline constexpr const char* kTakeUpRow = "burr_change/row";
+inline constexpr const char* kTakeUpTool = "burr_change/tool";
+inline constexpr const char* kTakeUpPose = "burr_change/pose";
+inline constexpr const char* kTakeUpView = "burr_change/view";
+inline constexpr const char* kTakeUpScale = "burr_change/scale";
+inline constexpr const char* kTakeUpDevice = "burr_change/anchor_device";
+inline constexpr const char* kTakeUpBone = "burr_change/anchor_bone";
 
 // Attributes of the group `metadata`: the device's DeviceLimits and DeviceInfo.
 inline constexpr const char* kMetadata = "metadata";
 inline constexpr const char* kDevice = "device";
+inline constexpr const char* kPointer = "pointer";  // the device of a hand that a mouse, pen or game pad leads
 inline constexpr const char* kModel = "device_model";
 inline constexpr const char* kCaseHash = "case_hash";
 inline constexpr const char* kCaseTitle = "case_title";

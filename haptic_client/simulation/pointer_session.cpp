@@ -23,12 +23,6 @@ constexpr double kFine = 0.1;
 constexpr double kReact_s = 0.6;  // as of the simulated surgeon
 constexpr double kStuck_s = 3.0;
 
-LoopParams pointer_params(const DeviceLimits& limits, const ForceScaling& scaling, double dt_s) {
-  LoopParams params = loop_params(limits, scaling);
-  params.dt_s = dt_s;
-  return params;
-}
-
 Vec3 limited(const Vec3& v, double most) {
   const double size = v.norm();
   return size > most ? Vec3(v * (most / size)) : v;
@@ -59,18 +53,29 @@ Result<ReadyPlan> make_pointed_hand(const FreeHandOptions& first, const Case& bo
   return ready;
 }
 
+LoopParams pointer_loop(const DeviceLimits& limits, const ForceScaling& scaling, double dt_s) {
+  LoopParams params = loop_params(limits, scaling);
+  params.dt_s = dt_s;
+  return params;
+}
+
+Pose pointer_start(const ReadyPlan& plan) {
+  const ReadyStep& step = plan.steps[0];
+  return {step.site.entry_mm - step.stand_off_mm * step.site.axis, pose_along(Vec3::Zero(), step.site.axis).rotation};
+}
+
 PointerSession::PointerSession(ReadyPlan plan, PointerExchange& exchange, const SimulatedDeviceParams& device,
                                const ForceScaling& scaling, double dt_s)
     : plan_(std::move(plan)),
       exchange_(exchange),
       device_(device),
-      loop_(pointer_params(device.limits, scaling, dt_s), plan_.tools) {
+      loop_(pointer_loop(device.limits, scaling, dt_s), plan_.tools) {
   near_.make_room(kMostContactPoints);
   // Until the pointer first meets the bone, the tool waits above it, as a free hand's does. Others see it there.
-  const ReadyStep& step = plan_.steps[0];
-  hand_.target_mm = step.site.entry_mm - step.stand_off_mm * step.site.axis;
-  hand_.axis = step.site.axis;
-  rotation_ = pose_along(Vec3::Zero(), step.site.axis).rotation;
+  const Pose start = pointer_start(plan_);
+  hand_.target_mm = start.position_mm;
+  hand_.axis = plan_.steps[0].site.axis;
+  rotation_ = start.rotation;
   WorkspaceMapping mapping;
   mapping.align(Eigen::Quaterniond::Identity(), 1.0, hand_.target_mm, hand_.target_mm);
   loop_.take_up(held_, {hand_.target_mm, rotation_}, mapping);
@@ -265,7 +270,8 @@ SessionTick PointerSession::tick(const Patch& patch, RoomLink room, int periods,
     // A hand that is stiffer across the axis than along it leaves the straight way, so a tilted tool would dip.
     const HandParams& hand = device_.hand().params();
     device_.hold_across(phase_ < PointerPhase::pushes ? hand.stiffness_n_per_mm : across_n_per_mm_);
-    device_.command(command, rotation_, (rpm > 0.0 ? kSpindlePedal : 0u) | other);
+    const std::uint32_t cuts = phase_ >= PointerPhase::pushes ? kHandCuts : 0u;
+    device_.command(command, rotation_, (rpm > 0.0 ? kSpindlePedal : 0u) | other | cuts);
     device_.step(dt_s);
   }
   const DeviceReading reading = device_.read();
@@ -286,6 +292,8 @@ SessionTick PointerSession::tick(const Patch& patch, RoomLink room, int periods,
   result.order.rotation = rotation_;
   result.reading = reading;
   result.commanded_rpm = result.order.spindle_rpm = rpm;
+  result.empty_hand = command_.empty_hand;
+  result.pointer_source = static_cast<std::uint8_t>(1 + static_cast<int>(command_.source));
   result.report = last_ = loop_.tick(input, patch, guides);
   device_.write({result.report.device.force_n, result.report.device.torque_nmm});
 

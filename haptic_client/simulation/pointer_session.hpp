@@ -22,6 +22,8 @@ struct PointerCommand {
   double push_n = 10.0, spindle = 0.0, spindle_rpm = 0.0;
   int tool = 0;  // index in the plan's tools
   bool irrigation = false, suction = false;
+  bool empty_hand = true;  // until a message says that it holds something
+  PointerSource source = PointerSource::mouse;
 };
 
 // What the hand and the tool do; bone frame.
@@ -44,6 +46,11 @@ struct PointerExchange {
 // and wear. Error invalid_input or not_found.
 [[nodiscard]] Result<ReadyPlan> make_pointed_hand(const FreeHandOptions& first, const Case& bone,
                                                   const std::vector<Tool>& tools);
+
+// The loop of a pointer's hand on a device with these limits.
+[[nodiscard]] LoopParams pointer_loop(const DeviceLimits& limits, const ForceScaling& scaling, double dt_s);
+// Where the first tool of the plan waits until the pointer first meets the bone, bone frame.
+[[nodiscard]] Pose pointer_start(const ReadyPlan& plan);
 
 enum class PointerPhase : std::uint8_t {
   away,      // the pointer is not over bone, or silent: the tool waits off the bone

@@ -11,6 +11,8 @@ struct SessionTick {
   DeviceReading reading;  // input of the loop
   double commanded_rpm = 0;
   LoopReport report;
+  bool empty_hand = false;          // it holds no tool: others see none
+  std::uint8_t pointer_source = 0;  // 1 and more: a PointerSource; 0: no pointer leads the hand
 };
 
 // A session of one tool operator. In each tick the operator moves the handle, and the loop responds.

@@ -111,7 +111,9 @@ Result<Tool> tool_named(const std::string& name, const fs::path& folder) {
 
 Result<std::vector<CarveStep>> read_carve_script(const fs::path& file) {
   std::error_code error;
-  if (!fs::is_regular_file(file, error)) return failure(ErrorCode::not_found, "there is no script " + file.string());
+  if (!fs::is_regular_file(file, error))
+    return failure(ErrorCode::not_found, "there is no script " + file.string() +
+                                             "; check its name, and give a YAML file with a list `steps`");
   std::size_t number = 0;
   try {
     const YAML::Node root = YAML::LoadFile(file.string());

@@ -308,6 +308,7 @@ Result<std::string> run_ct(const CaseArguments& a, const StopSignal& stop) {
 Result<std::string> run_series(const CaseArguments& a, const StopSignal& stop) {
   Bar bar(stop, "searching");
   const auto searching = bar.stage(0.0, 1.0);
+  if (Result<void> scan = check_no_case_file(a.input); !scan) return tl::unexpected(scan.error());
   if (const std::string_view one = name_of_one_scan(a.input, searching); !one.empty())
     return bad_input(a.input + " is " + std::string(one) + " with one scan; give it to osteon-import ct");
   const auto report = list_dicom_series(a.input, searching);

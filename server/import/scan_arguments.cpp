@@ -4,6 +4,8 @@
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
+#include <fstream>
+#include <string_view>
 #include <system_error>
 #include <utility>
 
@@ -105,6 +107,7 @@ Result<CtScan> read_any_scan(const ScanArguments& a, const KeepGoing& reading) {
     return bad_input(std::string(option) + " is for raw numbers and PNG slices; give --spacing too, or leave it out");
   if (!a.size.empty()) return read_raw(a, reading);
   if (is_given) return read_grey(a, reading);
+  if (Result<void> scan = check_no_case_file(a.input); !scan) return tl::unexpected(scan.error());
   const InputKind kind = input_kind(a.input, reading);
   if (!reading(0.0)) return tl::unexpected(stopped());
   if (kind == InputKind::absent)
@@ -140,6 +143,19 @@ std::string with_prefix(std::string message, const std::string& prefix) {
 }
 
 }  // namespace
+
+Result<void> check_no_case_file(const std::string& input) {
+  // A case file begins as a zip archive whose first file is case.json.
+  constexpr std::string_view kBegin = "PK\3\4", kFirst = "case.json";
+  constexpr std::size_t kNameAt = 30;
+  std::error_code error;
+  if (!fs::is_regular_file(input, error)) return {};
+  std::string head(kNameAt + kFirst.size(), '\0');
+  std::ifstream(input, std::ios::binary).read(head.data(), static_cast<std::streamsize>(head.size()));
+  if (!head.starts_with(kBegin) || !head.ends_with(kFirst)) return {};
+  return bad_input(input + " is a case in one file and no scan; make its folder first with: osteon-import unpack " +
+                   input + " --out FOLDER");
+}
 
 std::string_view name_of_one_scan(const std::string& input, const KeepGoing& keep_going) {
   return name_of_one_scan(input_kind(input, keep_going));

@@ -7,6 +7,7 @@
 #include <fstream>
 #include <memory>
 #include <optional>
+#include <string_view>
 #include <vector>
 
 namespace osteon {
@@ -39,11 +40,37 @@ std::string reason_of(archive* a) {
   return reason != nullptr ? reason : "unknown reason";
 }
 
+// A zip archive ends with a record of its entries, and a comment of up to 64 KiB (APPNOTE 6.3.10, section 4.3.16).
+constexpr std::size_t kEndRecord = 22, kMostEnd = kEndRecord + 0xffff;
+
+// How many entries the record at the end says there are. None: there is no such record, or it leaves that to another
+// record, as those of huge archives do.
+std::optional<int> entries_by_end(std::string_view end) {
+  constexpr std::size_t kCountAt = 10;
+  constexpr unsigned kElsewhere = 0xffff;
+  const std::size_t at = end.rfind("PK\5\6");
+  if (at == std::string_view::npos || end.size() - at < kEndRecord) return {};
+  const auto byte = [&](std::size_t i) { return static_cast<unsigned>(static_cast<unsigned char>(end[at + i])); };
+  const unsigned count = byte(kCountAt) | byte(kCountAt + 1) << 8;
+  return count == kElsewhere ? std::nullopt : std::optional(static_cast<int>(count));
+}
+
+// The last bytes of a file, where that record is.
+std::string end_of(const fs::path& file, std::uint64_t bytes) {
+  std::string end(std::min<std::uint64_t>(bytes, kMostEnd), '\0');
+  std::ifstream in(file, std::ios::binary);
+  in.seekg(static_cast<std::streamoff>(bytes - end.size()));
+  in.read(end.data(), static_cast<std::streamsize>(end.size()));
+  return end;
+}
+
 // Unpacks an open archive and counts the bytes on the way.
 class Unpacker {
  public:
-  Unpacker(archive* a, std::string name, std::uint64_t packed_bytes, const UploadQuota& quota, const PutPiece& put)
-      : archive_(a), name_(std::move(name)), packed_bytes_(packed_bytes), quota_(quota), put_(put) {}
+  // `said`: how many entries the archive says it has, if it does.
+  Unpacker(archive* a, std::string name, std::uint64_t packed_bytes, std::optional<int> said, const UploadQuota& quota,
+           const PutPiece& put)
+      : archive_(a), name_(std::move(name)), packed_bytes_(packed_bytes), said_(said), quota_(quota), put_(put) {}
 
   Result<std::map<std::string, std::uint64_t>> run() {
     int entries = 0;
@@ -58,9 +85,13 @@ class Unpacker {
                                                  std::to_string(std::size(kCaseFiles)) + " files");
       if (Result<void> taken = take(entry); !taken) return tl::unexpected(taken.error());
     }
-    for (const std::string_view file : std::span(kCaseFiles).first(kNeededCaseFiles))
-      if (!files_.contains(std::string(file)))
-        return bad("has no " + std::string(file) + "; pack the whole folder of a case");
+    for (const std::string_view file : std::span(kCaseFiles).first(kNeededCaseFiles)) {
+      if (files_.contains(std::string(file))) continue;
+      // The library finds the entries by the list at the end. It takes a damaged list for a shorter one.
+      if (entries == 0 || (said_ && *said_ != entries))
+        return bad("is not a sound zip archive (its list of files is damaged); copy it or pack the case again");
+      return bad("has no " + std::string(file) + "; pack the whole folder of a case");
+    }
     return files_;
   }
 
@@ -125,6 +156,7 @@ class Unpacker {
   archive* const archive_;
   const std::string name_;
   const std::uint64_t packed_bytes_;
+  const std::optional<int> said_;
   const UploadQuota& quota_;
   const PutPiece& put_;
   std::optional<std::string> folder_;
@@ -159,7 +191,7 @@ Result<std::map<std::string, std::uint64_t>> unpack_case(const fs::path& file, c
   if (archive_read_open_filename(a.get(), file.c_str(), kChunk) != ARCHIVE_OK)
     return failure(ErrorCode::invalid_input,
                    name + " is not a zip archive (" + reason_of(a.get()) + "); pack the case as a zip archive");
-  return Unpacker(a.get(), name, bytes, quota, put).run();
+  return Unpacker(a.get(), name, bytes, entries_by_end(end_of(file, bytes)), quota, put).run();
 }
 
 Result<std::map<std::string, std::uint64_t>> unpack_case(std::span<const std::byte> bytes, const std::string& name,
@@ -168,7 +200,9 @@ Result<std::map<std::string, std::uint64_t>> unpack_case(std::span<const std::by
   if (archive_read_open_memory(a.get(), bytes.data(), bytes.size()) != ARCHIVE_OK)
     return failure(ErrorCode::invalid_input,
                    name + " is not a zip archive (" + reason_of(a.get()) + "); pack the case as a zip archive");
-  return Unpacker(a.get(), name, bytes.size(), quota, put).run();
+  const auto end = bytes.last(std::min(bytes.size(), kMostEnd));
+  const std::string_view text(reinterpret_cast<const char*>(end.data()), end.size());
+  return Unpacker(a.get(), name, bytes.size(), entries_by_end(text), quota, put).run();
 }
 
 Result<void> pack_case(const fs::path& folder, const fs::path& file, const KeepGoing& keep_going) {

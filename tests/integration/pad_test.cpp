@@ -64,8 +64,8 @@ TEST_F(PadTest, APadDrillsRumblesUndoesAndLetsGoWhenItIsUnplugged) {
   hand.right_trigger = 0.8;
   plug_->hold(hand);
   ASSERT_TRUE(until([&] { return pointer.pushing(); })) << problem();
-  constexpr double kRest = PadControl::kTriggerRest;
-  EXPECT_NEAR(pointer.push_n(), 1.0 + 39.0 * (0.8 - kRest) / (1.0 - kRest), 0.01);
+  constexpr double kPulled = PadControl::kTriggerPulled;
+  EXPECT_NEAR(pointer.push_n(), 1.0 + 39.0 * (0.8 - kPulled) / (1.0 - kPulled), 0.01);
   ASSERT_TRUE(until([&] { return cut(); })) << problem();
   EXPECT_TRUE(until([&] { return !plug_->quiet(); }));
   // 30 N are the device's, so 20 N or more are √(2/3) of the motor.

@@ -37,11 +37,13 @@ class PointerInRoom : public ::testing::Test {
     window_ = std::move(*made);
   }
   [[nodiscard]] std::filesystem::path socket() const { return folder_ / "pointer"; }
-  Process start(const Stage& stage) const {
-    return stage.start(
-        "osteon-haptic",
-        {"--server", stage.address(), "--plain", "--device", "pointer:" + socket().string(), "--tool", "drill-3.2",
-         "--summary", stage / "hand.json", "--session-log", stage / "hand.csv", "--cache", stage / "cache"});
+  Process start(const Stage& stage, const std::vector<std::string>& more = {}) const {
+    std::vector<std::string> all{
+        "--server",         stage.address(), "--plain",      "--device",          "pointer:" + socket().string(),
+        "--tool",           "drill-3.2",     "--summary",    stage / "hand.json", "--session-log",
+        stage / "hand.csv", "--cache",       stage / "cache"};
+    all.insert(all.end(), more.begin(), more.end());
+    return stage.start("osteon-haptic", all);
   }
   // Says again and again what the pointer wants, as a window does, until the client's answer is as asked. False: it
   // never was.
@@ -264,6 +266,41 @@ TEST_F(PointerInRoom, TakesAnotherToolWithoutARestart) {
   EXPECT_EQ(summary["rejected"], 0);
   ASSERT_EQ(stage.server().terminate(), 0);
   EXPECT_EQ(read_json(stage / "server.json")["field_hash"], summary["field_hash"]);
+}
+
+// The recording leads the tool as the pointer's hand did, without a window.
+TEST_F(PointerInRoom, ItsRecordingIsPlayedAgainInAnotherRoom) {
+  Stage stage(24.0);
+  const std::string file = stage / "hand.h5";
+  Process haptic = start(stage, {"--record", file});
+  ASSERT_TRUE(say_until_rests()) << haptic.err();
+  input_.spindle = 1.0;
+  ASSERT_TRUE(press()) << haptic.err();
+  ASSERT_TRUE(say_until([&](const PointerOutput&) { return tip_z_mm() < -3.0; })) << haptic.err();
+  input_.push = false;
+  ASSERT_TRUE(say_until_rests()) << haptic.err();
+  ASSERT_EQ(haptic.terminate(), 0) << haptic.err();
+  const double removed_mm3 = read_json(stage / "hand.json")["removed_mm3"].get<double>();
+  ASSERT_GT(removed_mm3, 10.0);
+  ASSERT_EQ(stage.server().terminate(), 0);
+
+  stage.start_server({"--plain"});
+  const auto play = [&](const std::vector<std::string>& hand) {
+    std::vector<std::string> all{"--server", stage.address(), "--plain",   "--device",          "recorded:" + file,
+                                 "--cache",  stage / "cache", "--summary", stage / "again.json"};
+    all.insert(all.end(), hand.begin(), hand.end());
+    Process played = stage.start("osteon-haptic", all);
+    const int code = played.wait(120s).value_or(-1);
+    return std::pair(code, played.err());
+  };
+  const auto [code, err] = play({"--tool", "drill-3.2"});
+  ASSERT_EQ(code, 0) << err;
+  // Real threads deliver the patches, so cuts agree in size but not bit by bit.
+  EXPECT_NEAR(read_json(stage / "again.json")["removed_mm3"].get<double>(), removed_mm3, 0.03 * removed_mm3);
+  EXPECT_THAT(play({"--tool", "burr-round-5"}).second, testing::HasSubstr("give --tool drill-3.2"));
+  std::ofstream(stage / "plan.json") << R"({"steps": [{"action": "wait", "seconds": 0.1}]})";
+  EXPECT_THAT(play({"--plan", stage / "plan.json"}).second,
+              testing::HasSubstr("leave out --plan and give the --tool that it began with, drill-3.2"));
 }
 
 TEST_F(PointerInRoom, WhatIsWrongIsSaidBeforeAServerIsLookedFor) {

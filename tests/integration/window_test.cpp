@@ -98,6 +98,27 @@ TEST_F(WindowTest, WheelSpaceAndShiftSetPushSpindleAndFineMotion) {
   EXPECT_TRUE(window_->statusBar()->currentMessage().startsWith("Choose a tool"));
 }
 
+// The haptic client holds a tool from its start on. As long as the user has none, nobody sees it.
+TEST_F(WindowTest, AnEmptyHandIsNotDrawn) {
+  open();
+  const auto holds = [&](const std::string& tool) {
+    const auto states = view_->updater()->states();
+    return !states.empty() && states.front().tool_name == tool;
+  };
+  ASSERT_TRUE(until([&] { return holds(""); })) << problem();
+  EXPECT_EQ(label("position"), "");
+  click_tool("drill");
+  hover(middle());
+  EXPECT_TRUE(until([&] { return holds("drill-3.2") && label("position").startsWith("Tip"); })) << problem();
+  trigger("put_down");
+  EXPECT_TRUE(until([&] { return holds("") && label("position").isEmpty(); })) << problem();
+  // An item that waits for its place is in no hand either.
+  click_tool("drill");
+  EXPECT_TRUE(until([&] { return holds("drill-3.2"); })) << problem();
+  window_->findChild<QToolButton*>("pin")->defaultAction()->trigger();
+  EXPECT_TRUE(until([&] { return holds(""); })) << problem();
+}
+
 // How often the window is put together anew, for the picture or for any panel.
 class WindowUpdates : public QObject {
  public:
@@ -475,6 +496,31 @@ TEST_F(WindowTest, TheTourFollowsWhatIsDone) {
   EXPECT_FALSE(window_->findChild<Tour*>("tour")->isVisible());
 }
 
+TEST_F(WindowTest, TheTourBeginsWithWhatIsStillToBeDone) {
+  auto* tour = window_->findChild<Tour*>("tour");
+  trigger("tour_again");
+  EXPECT_EQ(tour->accessibleName(), "Step 1 of 5");
+  // The card covers a part of the list that it is about, and nothing of the list beside it.
+  const auto place = [&](const char* name) {
+    const auto* part = window_->findChild<QWidget*>(name);
+    return QRect(part->mapTo(window_.get(), QPoint(0, 0)), part->size());
+  };
+  EXPECT_TRUE(place("examples").contains(tour->geometry()));
+  EXPECT_FALSE(place("recent").intersects(tour->geometry()));
+  tour->end();
+  open();
+  trigger("tour_again");
+  EXPECT_EQ(tour->accessibleName(), "Step 2 of 5");
+  tour->end();
+  click_tool("drill");
+  trigger("tour_again");
+  EXPECT_EQ(tour->accessibleName(), "Step 3 of 5");
+  tour->end();
+  trigger("start_page");
+  trigger("tour_again");
+  EXPECT_EQ(tour->accessibleName(), "Step 1 of 5");
+}
+
 TEST_F(WindowTest, TheTourIsLedAndEndedByTheKeyboard) {
   auto* tour = window_->findChild<Tour*>("tour");
   trigger("tour_again");
@@ -545,6 +591,29 @@ TEST_F(WindowTest, ClosingInTheMiddleOfACutEndsAllAndKeepsTheCut) {
   ASSERT_GE(list->count(), 1);
   QTest::mouseClick(list->viewport(), Qt::LeftButton, {}, list->visualItemRect(list->item(0)).center());
   EXPECT_TRUE(until([&] { return view_->surface_shown() && cut(); })) << problem();
+}
+
+// The server is stopped while it owes answers: to the marks before pushes, and to the pings of the panel.
+TEST_F(WindowTest, AServerThatHangsHoldsTheClosingForTwoSecondsAndLosesNothing) {
+  open();
+  drill();
+  release(middle());
+  ASSERT_TRUE(until([&] { return !view_->pointer().pushing() && cut(); })) << problem();
+  const auto servers = children("osteon-server");
+  ASSERT_EQ(servers.size(), 1u);
+  ASSERT_EQ(::kill(servers[0], SIGSTOP), 0);
+  trigger("connections");
+  QTest::qWait(500);
+  const auto began = std::chrono::steady_clock::now();
+  window_->close();
+  EXPECT_LT(std::chrono::steady_clock::now() - began, 3s) << "of which the programs may take two";
+  EXPECT_TRUE(children("osteon-server").empty());
+  EXPECT_TRUE(children("osteon-haptic").empty());
+  const auto session = recent_entries().front().session;
+  begin();
+  open(session);
+  EXPECT_TRUE(until([&] { return cut(); })) << problem();
+  window_->findChild<QDockWidget*>("connection_panel")->hide();
 }
 
 TEST_F(WindowTest, ACaseInOneFileIsSavedOpenedAndDropped) {

@@ -266,6 +266,59 @@ TEST_F(WrongUse, ADiskThatFillsUpEndsTheSessionAndKeepsTheCut) {
   EXPECT_TRUE(cut());
 }
 
+// As after a crash of the machine: half of the bone is there, then not even case.json.
+TEST_F(WrongUse, ADamagedExampleIsMadeAnewAndItsSessionGoesOn) {
+  const auto bones = example_bones();
+  const auto patella = std::ranges::find(bones, QString("patella"), &ExampleBone::id);
+  ASSERT_NE(patella, bones.end());
+  const fs::path folder = example_folder(*patella);
+  const auto sound = [&] {
+    return test::run(test::program("osteon-import"), {"info", folder.string()}, 60s).exit_code == 0;
+  };
+  fs::create_directories(folder.parent_path());
+  fs::copy(desk_->bone(), folder);
+  fs::resize_file(folder / "bone.vdb", fs::file_size(folder / "bone.vdb") / 2);
+  ASSERT_FALSE(sound());
+  window_->open_example(*patella);
+  ASSERT_TRUE(until([&] { return label("words") == patella->title + " was damaged and is made anew."; })) << problem();
+  ASSERT_TRUE(until([&] { return view_->surface_shown(); })) << problem();
+  EXPECT_TRUE(sound());
+  EXPECT_NE(content(folder / "case.json").find("atella"), std::string::npos);
+
+  const fs::path last = session();
+  window_->findChild<QAction*>("start_page")->trigger();
+  fs::resize_file(folder / "bone.vdb", fs::file_size(folder / "bone.vdb") / 2);
+  window_->practise(folder, last);
+  ASSERT_TRUE(until([&] { return view_->surface_shown(); })) << problem();
+  EXPECT_EQ(session(), last);
+  EXPECT_TRUE(sound());
+
+  window_->findChild<QAction*>("start_page")->trigger();
+  fs::remove(folder / "case.json");
+  window_->open_example(*patella);
+  ASSERT_TRUE(until([&] { return view_->surface_shown(); })) << problem();
+  EXPECT_TRUE(sound());
+  window_.reset();
+  fs::remove_all(folder);
+}
+
+// The start page shows why a session does not open, and a sound case stays as it is.
+TEST_F(WrongUse, ASoundExampleIsNotMadeAnewForAnotherFault) {
+  const auto bones = example_bones();
+  const auto patella = std::ranges::find(bones, QString("patella"), &ExampleBone::id);
+  ASSERT_NE(patella, bones.end());
+  const fs::path folder = example_folder(*patella), broken = desk_->temp() / "broken-session";
+  fs::create_directories(folder.parent_path());
+  fs::copy(desk_->bone(), folder);
+  const std::string before = content(folder / "case.json");
+  fs::create_directories(broken);
+  put_bytes(broken / "session.journal", "this is no journal");
+  window_->practise(folder, broken);
+  EXPECT_NE(refused().find("journal"), std::string::npos);
+  EXPECT_EQ(content(folder / "case.json"), before);
+  fs::remove_all(folder);
+}
+
 TEST_F(WrongUse, ADoubleClickOpensASessionOnce) {
   open();
   window_->close();

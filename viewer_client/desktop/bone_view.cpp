@@ -72,7 +72,7 @@ void BoneView::set_holding(bool on) {
   placing_ = placing_ && !on;
   if (!on) {
     lift_pen();
-    pointer_.leave();
+    pointer_.put_down();
   }
   pointer_moved();
 }
@@ -139,8 +139,8 @@ void BoneView::look_from(const Vec3& side) {
 }
 
 void BoneView::look_tool() {
-  if (updater_ && !updater_->states().empty())
-    look(beside_tool(updater_->states().front().pose_bone_tool, kToolDistance_mm));
+  if (const CuttingState* held = updater_ ? updater_->held_tool() : nullptr)
+    look(beside_tool(held->pose_bone_tool, kToolDistance_mm));
   following_ = follows_;
 }
 
@@ -198,8 +198,9 @@ void BoneView::pad_gone() {
 }
 
 void BoneView::follow_tool() {
-  if (!following_ || !updater_ || updater_->states().empty()) return;
-  const Pose& tool = updater_->states().front().pose_bone_tool;
+  const CuttingState* held = following_ && updater_ ? updater_->held_tool() : nullptr;
+  if (held == nullptr) return;
+  const Pose& tool = held->pose_bone_tool;
   const CameraView now = camera();
   const bool near = (now.target_mm - tool.position_mm).norm() <= kFollowed_mm;
   if (!near || (now.eye_mm - now.target_mm).norm() > 1.01 * kToolDistance_mm) look_tool();

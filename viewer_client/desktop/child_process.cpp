@@ -5,12 +5,15 @@
 #include <QCoreApplication>
 #include <QFile>
 #include <QFileInfo>
+#include <algorithm>
 #include <csignal>
+#include <utility>
 
 namespace osteon {
 
 namespace {
-constexpr int kPatience_ms = 8000;
+constexpr std::chrono::milliseconds kPatience{2000};
+constexpr int kKilled_ms = 2000;  // the kernel ends it at once, except in the middle of a call to a broken disk
 }  // namespace
 
 ChildProcess::ChildProcess(const QString& log_file) : log_file_(log_file) {
@@ -18,14 +21,19 @@ ChildProcess::ChildProcess(const QString& log_file) : log_file_(log_file) {
   setStandardErrorFile(log_file);
 }
 
-ChildProcess::~ChildProcess() {
-  // Its end is wanted now, so nobody is to hear of it.
+ChildProcess::~ChildProcess() { end(kPatience); }
+
+void ChildProcess::ask_to_end() {
   disconnect();
+  if (state() != NotRunning && !std::exchange(asked_, true)) terminate();
+}
+
+void ChildProcess::end(std::chrono::milliseconds patience) {
+  ask_to_end();
   if (state() == NotRunning) return;
-  terminate();
-  if (waitForFinished(kPatience_ms)) return;
+  if (waitForFinished(static_cast<int>(std::max(patience, std::chrono::milliseconds(0)).count()))) return;
   kill();
-  waitForFinished(kPatience_ms);
+  waitForFinished(kKilled_ms);
 }
 
 QString ChildProcess::last_sentence() const {

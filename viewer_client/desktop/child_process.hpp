@@ -3,6 +3,7 @@
 #include <QProcess>
 #include <QString>
 #include <QStringList>
+#include <chrono>
 #include <filesystem>
 
 namespace osteon {
@@ -11,8 +12,13 @@ class ChildProcess : public QProcess {
  public:
   // Its messages go to `log_file`.
   explicit ChildProcess(const QString& log_file);
-  // Asks it to end, waits, and ends it by force if it does not obey.
+  // As end(), with the patience that a program without a deadline gets.
   ~ChildProcess() override;
+
+  // Asks it to end and returns at once. From now on nobody hears of its end.
+  void ask_to_end();
+  // Asks it to end, waits so long, and then ends it by force.
+  void end(std::chrono::milliseconds patience);
 
   // The last line of the log file: the sentence with which an Osteon program ends. Empty: there is none.
   [[nodiscard]] QString last_sentence() const;
@@ -22,6 +28,7 @@ class ChildProcess : public QProcess {
 
  private:
   QString log_file_;
+  bool asked_ = false;  // to end; a second signal would end it in a hurry
 };
 
 // An Osteon program beside this one. Its bare name, if it is not there: then PATH decides.

@@ -23,6 +23,7 @@ void ImporterRun::start() {
   importer_ = std::make_unique<ChildProcess>(log_file_);
   connect(importer_.get(), QOverload<int, QProcess::ExitStatus>::of(&QProcess::finished), this,
           [this](int code, QProcess::ExitStatus how) { ended(how == QProcess::NormalExit ? code : -1); });
+  connect(importer_.get(), &QProcess::started, this, [this] { ran_ = true; });
   connect(importer_.get(), &QProcess::errorOccurred, this, [this](QProcess::ProcessError error) {
     if (error != QProcess::FailedToStart) return;
     progress_timer_.stop();

@@ -65,6 +65,12 @@ bool is_name_of_unpacked(std::string_view name) {
   return name.size() == kHashLetters && name.find_first_not_of("0123456789abcdef") == std::string_view::npos;
 }
 
+bool can_be_made_again(const std::filesystem::path& bone) {
+  for (const ExampleBone& example : example_bones())
+    if (bone == example_folder(example)) return true;
+  return bone.parent_path() == cases_folder() && is_name_of_unpacked(bone.filename().string());
+}
+
 bool is_file(const std::filesystem::path& path) {
   std::error_code ignored;
   return std::filesystem::is_regular_file(path, ignored);

@@ -46,6 +46,8 @@ void remember(const RecentEntry& entry);
 [[nodiscard]] std::filesystem::path new_session_folder(const std::filesystem::path& bone);
 // "unpack --into" names a folder so, by the SHA-256 of the file. An import never does.
 [[nodiscard]] bool is_name_of_unpacked(std::string_view name);
+// The window has made the case by itself, of an example or of a case file, and can do so again.
+[[nodiscard]] bool can_be_made_again(const std::filesystem::path& bone);
 // The title of a case, or the name of its folder. That of an example is translated.
 [[nodiscard]] QString case_title(const std::filesystem::path& bone);
 [[nodiscard]] bool is_case(const std::filesystem::path& folder);

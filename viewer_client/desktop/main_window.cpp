@@ -87,6 +87,7 @@ MainWindow::MainWindow() {
                           [this] { choose_case(); }, [this] { choose_scan(); }, [this] { choose_room(); },
                           [this] {
                             if (maker_) return maker_->cancel();
+                            if (checker_) return checker_->cancel();
                             leave_room();  // a room that does not answer
                           }});
   view_ = new BoneView;
@@ -204,111 +205,17 @@ void MainWindow::say(const QString& sentence) {
   statusBar()->showMessage(shown, kMessage_ms);
 }
 
-void MainWindow::make_case(const QString& what, const QStringList& how, const std::filesystem::path& out,
-                           const QString& name) {
-  if (maker_) return;
-  start_->show_work(what);
-  pages_->setCurrentWidget(start_);
-  enable_opening(false);
-  maker_ = std::make_unique<CaseMaker>(
-      how, out,
-      CaseMaker::Events{[this](int percent) { start_->show_progress(percent); },
-                        [this, name](const std::filesystem::path& bone) {
-                          maker_.release()->deleteLater();
-                          enable_opening(true);
-                          start_->end_work({});
-                          practise(bone, {}, name);
-                        },
-                        [this](const QString& sentence) {
-                          maker_.release()->deleteLater();
-                          enable_opening(true);
-                          start_->end_work(sentence.isEmpty() ? tr("Cancelled. Nothing was written.") : sentence);
-                        }});
-  maker_->start();
-}
-
-void MainWindow::open_example(const ExampleBone& bone) {
-  if (maker_ || practice_) return;
-  const std::filesystem::path folder = example_folder(bone);
-  if (is_case(folder)) return practise(folder);
-  make_case(tr("%1 is made now. The next time it opens at once.").arg(bone.title), bone.how, folder);
-}
-
-void MainWindow::import_scan(const QString& source) {
-  if (maker_) return;
-  leave_room();
-  QString name = QFileInfo(source).completeBaseName();
-  if (name.isEmpty() || is_name_of_unpacked(name.toStdString())) name = "case";
-  std::filesystem::path out = data_folder() / "cases" / name.toStdString();
-  for (int n = 2; std::filesystem::exists(out); ++n)
-    out = data_folder() / "cases" / (name.toStdString() + "-" + std::to_string(n));
-  make_case(tr("Importing %1").arg(source), {"ct", source}, out);
-}
-
-void MainWindow::choose_scan() {
-  const QString folder = QFileDialog::getExistingDirectory(this, tr("The folder of a CT"));
-  if (!folder.isEmpty()) import_scan(folder);
-}
-
-void MainWindow::choose_case() {
-  // A file dialog chooses files only, so a folder is chosen by its case.json.
-  const QString chosen =
-      QFileDialog::getOpenFileName(this, tr("Open a case"), {}, tr("Cases (*.osteon case.json);;All files (*)"));
-  if (chosen.isEmpty()) return;
-  const std::filesystem::path path = chosen.toStdString();
-  if (path.filename() != "case.json") return open_case_file(path);
-  practise(path.parent_path());
-}
-
-void MainWindow::open_case_file(const std::filesystem::path& file) {
-  if (maker_) return;
-  leave_room();
-  const QString name = text_of(file.filename());
-  make_case(tr("Opening %1").arg(name), {"unpack", text_of(std::filesystem::absolute(file))}, {}, name);
-}
-
-void MainWindow::save_bone_as() {
-  if (!opened_) return;
-  // With a suffix of its own the dialog asks before it names a file that is there.
-  QFileDialog dialog(this, tr("Save the bone"), {}, tr("Cases (*.osteon)"));
-  dialog.setAcceptMode(QFileDialog::AcceptSave);
-  dialog.setDefaultSuffix("osteon");
-  dialog.selectFile(QFileInfo(case_title(opened_->bone)).fileName() + ".osteon");
-  if (dialog.exec() == QDialog::Accepted) save_case_file(dialog.selectedFiles().constFirst());
-}
-
-void MainWindow::save_case_file(const QString& file) {
-  if (!opened_) return;
-  if (saver_) return say(tr("Another bone is being saved. Try again when that is done."));
-  const QString log = text_of(cases_folder() / "pack-") + QString::number(QCoreApplication::applicationPid()) + ".log";
-  const auto end = [this](const QString& sentence) {
-    saver_.release()->deleteLater();
-    say(sentence);
-    if (std::exchange(closes_when_saved_, false)) close();
-  };
-  // The dialog has asked whether to write over a file that is there.
-  saver_ = std::make_unique<ImporterRun>(
-      QStringList{"pack", "--replace", text_of(opened_->bone), file}, log,
-      ImporterRun::Events{[this, file](int percent) { say(tr("Saving %1: %2 %").arg(file, QString::number(percent))); },
-                          [end, file](const QString&) { end(tr("Saved %1.").arg(file)); },
-                          [this, end](const QString& why) {
-                            closes_when_saved_ = false;  // the user is to read it, and to try again
-                            end(why);
-                          }});
-  saver_->start();
-}
-
 void MainWindow::dragEnterEvent(QDragEnterEvent* event) {
-  if (!maker_ && !dragged_path(*event->mimeData()).empty()) event->acceptProposedAction();
+  if (!is_busy() && !dragged_path(*event->mimeData()).empty()) event->acceptProposedAction();
 }
 
 void MainWindow::dropEvent(QDropEvent* event) {
   const std::filesystem::path path = dragged_path(*event->mimeData());
-  if (maker_ || path.empty()) return;
+  if (is_busy() || path.empty()) return;
   event->acceptProposedAction();
   // Later, so that the program from which it comes need not wait.
   QTimer::singleShot(0, this, [this, path] {
-    if (maker_) return;
+    if (is_busy()) return;
     if (is_case(path)) return practise(path);
     if (is_file(path) && path.extension() == ".osteon") return open_case_file(path);
     say(tr("%1 is no case: drop an .osteon file, or the folder of a case.").arg(text_of(path)));
@@ -385,7 +292,7 @@ void MainWindow::practise(const std::filesystem::path& bone, const std::filesyst
   practice_ = std::make_unique<PracticeRoom>(
       options, PracticeRoom::Events{[this](const QString& address) { room_opened(address); },
                                     [this](const QString& sentence) { say(sentence); },
-                                    [this](const QString& sentence) { room_ended(sentence); }});
+                                    [this](const QString& sentence) { practice_failed(sentence); }});
   practice_->start();
 }
 
@@ -451,6 +358,7 @@ void MainWindow::show_joined(const WatchedRoom& room) {
     pad_ = std::make_unique<PadHand>(*view_, PadHand::Events{[this](const QString& sentence) { say(sentence); },
                                                              [this] { findChild<QAction*>("undo")->trigger(); }});
   if (opened_) remember(*opened_);
+  made_anew_.clear();
   view_->setFocus();
   tour_->did(TourStep::open);
   if (watching_) tour_->end();
@@ -480,7 +388,7 @@ void MainWindow::leave_room() {
   room_name_.clear();
   setWindowTitle("Osteon");
   for (QLabel* label : {device_, position_, connection_}) label->clear();
-  if (!maker_) start_->end_work({});
+  if (!is_busy()) start_->end_work({});
   start_->refresh();
   pages_->setCurrentWidget(start_);
 }
@@ -626,6 +534,12 @@ void MainWindow::show_help() {
   QMessageBox::information(this, tr("How to hold a tool"), text);
 }
 
+// Who watches can do no step but the first.
+TourStep MainWindow::next_step() const {
+  if (!room_ || !room_->joined() || watching_) return TourStep::open;
+  return view_->holding() ? TourStep::push : TourStep::take;
+}
+
 void MainWindow::follow_pad() {
   if (!pad_) return;
   PadFeel feel;
@@ -654,14 +568,18 @@ void MainWindow::refresh_gauges() {
     const CuttingState& state = updater->states().front();
     gauges_->show(state, hand, 1e-3 * static_cast<double>(clock_.elapsed()));
     show_other_hand(state);
-    const Vec3& at = state.pose_bone_tool.position_mm;
+  }
+  const CuttingState* held = updater != nullptr ? updater->held_tool() : nullptr;
+  if (held != nullptr) {
+    const Vec3& at = held->pose_bone_tool.position_mm;
     position_->setText(tr("Tip %1, %2, %3 mm")
                            .arg(QLocale().toString(at.x(), 'f', 1), QLocale().toString(at.y(), 'f', 1),
                                 QLocale().toString(at.z(), 'f', 1)));
+  } else if (!position_->text().isEmpty()) {
+    position_->clear();
   }
   risk_->set_plan(updater != nullptr ? updater->plan() : nullptr);
-  const bool any = updater != nullptr && !updater->states().empty();
-  risk_->show_tip(any ? std::optional(updater->states().front().pose_bone_tool.position_mm) : std::nullopt);
+  risk_->show_tip(held != nullptr ? std::optional(held->pose_bone_tool.position_mm) : std::nullopt);
   if (const QString fault = QString::fromStdString(view_->take_plan_fault()); !fault.isEmpty()) say(fault);
   if (pointer_)
     device_->setText(!pointer_->connected() ? tr("The pointer's device is away")
@@ -736,6 +654,7 @@ void MainWindow::closeEvent(QCloseEvent* event) {
   settings.setValue("window/geometry", saveGeometry());
   settings.setValue("window/state", saveState());
   if (maker_) maker_->cancel();
+  checker_.reset();
   leave_room();
   event->accept();
 }

@@ -36,6 +36,7 @@ class StartPage;
 class SurgeryToolBar;
 class Tour;
 class ViewOptions;
+enum class TourStep : int;
 struct ConnectionState;
 struct CuttingState;
 
@@ -91,8 +92,17 @@ class MainWindow : public QMainWindow {
   void make_panels();
   void make_status();
 
+  // `session`: to go on with in the case, as of practise().
   void make_case(const QString& what, const QStringList& how, const std::filesystem::path& out,
-                 const QString& name = {});
+                 const QString& name = {}, const std::filesystem::path& session = {});
+  // A case is made or checked.
+  [[nodiscard]] bool is_busy() const;
+  // The practice room has ended for good, for this reason.
+  void practice_failed(const QString& sentence);
+  // Looks whether a case is damaged. Then it is made anew. Otherwise the start page shows `sentence`.
+  void check_case(const RecentEntry& entry, const QString& sentence);
+  // The case of an example, and its session goes on. An unpacked case is removed: its file makes it again.
+  void make_anew(const RecentEntry& entry);
   void choose_scan();
   void choose_case();
   void save_bone_as();
@@ -115,6 +125,8 @@ class MainWindow : public QMainWindow {
   void mark_moment();
   void save_picture();
   void show_help();
+  // The step of the tour that the user has still to do.
+  [[nodiscard]] TourStep next_step() const;
   void follow_pad();
   void refresh_gauges();
   void show_other_hand(const CuttingState& state);
@@ -144,7 +156,8 @@ class MainWindow : public QMainWindow {
   std::filesystem::path sockets_;
   std::unique_ptr<Leftovers> leftovers_;  // outlives the programs below
   std::unique_ptr<CaseMaker> maker_;
-  std::unique_ptr<ImporterRun> saver_;
+  std::unique_ptr<ImporterRun> saver_, checker_;
+  std::filesystem::path made_anew_;  // the case for which that was tried; empty: it opened since
   std::unique_ptr<PointerServer> pointer_;
   std::unique_ptr<PracticeRoom> practice_;
   std::unique_ptr<RoomLink> room_;

@@ -168,7 +168,7 @@ void MainWindow::make_help_menu() {
   add_action(
       help, tr("&How to hold a tool"), "help", QKeySequence::HelpContents, [this] { show_help(); }, false);
   add_action(
-      help, tr("&Tour"), "tour_again", QKeySequence("Ctrl+F1"), [this] { tour_->begin(); }, false);
+      help, tr("&Tour"), "tour_again", QKeySequence("Ctrl+F1"), [this] { tour_->begin(next_step()); }, false);
   add_action(
       help, tr("&About Osteon"), "about", {},
       [this] {

@@ -4,6 +4,7 @@
 #include <QDir>
 #include <QElapsedTimer>
 #include <QFile>
+#include <chrono>
 #include <utility>
 
 namespace osteon {
@@ -16,6 +17,9 @@ constexpr int kMostDeaths = 3;
 constexpr int kSettled_ms = 20000;
 constexpr int kAddressPeriod_ms = 30;
 constexpr int kRestart_ms = 300;
+// What ends as it should needs a second for all. A program that hangs must not hold the window, and what it
+// acknowledged is on the disk: the journal syncs before it acknowledges. So it is killed.
+constexpr std::chrono::milliseconds kClientsEnd{1200}, kAllEnd{1700};
 
 }  // namespace
 
@@ -26,9 +30,14 @@ PracticeRoom::PracticeRoom(PracticeOptions options, Events events)
 
 PracticeRoom::~PracticeRoom() {
   over_ = true;
-  haptic_.reset();
-  audio_.reset();
-  server_.reset();
+  QElapsedTimer since;
+  since.start();
+  const auto left = [&](std::chrono::milliseconds of) { return of - std::chrono::milliseconds(since.elapsed()); };
+  for (ChildProcess* client : {haptic_.get(), audio_.get()})
+    if (client != nullptr) client->ask_to_end();
+  for (ChildProcess* client : {haptic_.get(), audio_.get()})
+    if (client != nullptr) client->end(left(kClientsEnd));
+  if (server_) server_->end(left(kAllEnd));
 }
 
 QString PracticeRoom::log_file(const QString& program) const {

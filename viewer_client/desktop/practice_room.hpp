@@ -37,7 +37,8 @@ class PracticeRoom : public QObject {
   };
 
   PracticeRoom(PracticeOptions options, Events events);
-  ~PracticeRoom() override;  // ends the clients first, then the server
+  // Ends the clients first, then the server, all within two seconds. It kills what does not obey.
+  ~PracticeRoom() override;
 
   void start();
   [[nodiscard]] ProgramState server_state() const { return state_of(server_.get(), server_past_); }

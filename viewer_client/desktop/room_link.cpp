@@ -13,6 +13,8 @@ RoomLink::RoomLink(const RoomSubscriptionOptions& options, Events events) : even
 
 RoomLink::~RoomLink() {
   stop_ = true;
+  // A request whose answer does not come would hold the thread for seconds.
+  if (subscription_) subscription_->end();
   changed_.notify_all();
   thread_.join();
 }

@@ -60,8 +60,8 @@ void Tour::begin_once() {
   if (!running()) show_step(0);
 }
 
-void Tour::begin() {
-  show_step(0);
+void Tour::begin(TourStep from) {
+  show_step(static_cast<int>(from));
   next_->setFocus();
 }
 
@@ -101,15 +101,19 @@ void Tour::show_step(int step) {
 
 void Tour::place() {
   const QWidget* frame = parentWidget();
-  resize(kCardWidth_px, std::max(layout()->totalHeightForWidth(kCardWidth_px), layout()->minimumSize().height()));
   const auto* target = frame->findChild<QWidget*>(kTargets[step_]);  // if it is hidden, the card is alone
   const bool seen = target != nullptr && target->isVisible();
+  const QRect rect = seen ? QRect(target->mapTo(frame, QPoint(0, 0)), target->size()) : QRect();
+  // Within a large target the card covers no neighbour, so it may become narrower.
+  const int room_px = rect.width() - 2 * kGap_px;
+  const bool wide = 3 * rect.width() > 2 * kCardWidth_px && room_px >= layout()->minimumSize().width();
+  const int width_px = wide ? std::min(kCardWidth_px, room_px) : kCardWidth_px;
+  resize(width_px, std::max(layout()->totalHeightForWidth(width_px), layout()->minimumSize().height()));
   QPoint at((frame->width() - width()) / 2, frame->height() - height() - 4 * kGap_px);
   if (seen) {
-    const QRect rect(target->mapTo(frame, QPoint(0, 0)), target->size());
     ring_->setGeometry(rect.adjusted(-kRing_px, -kRing_px, kRing_px, kRing_px));
-    if (3 * rect.width() > 2 * width() && rect.height() > 2 * height())
-      at = {rect.left() + kGap_px, rect.bottom() - height() - kGap_px};  // within a large one
+    if (wide && rect.height() > 2 * height())
+      at = {rect.left() + kGap_px, rect.bottom() - height() - kGap_px};
     else if (rect.height() > rect.width())
       at = {rect.right() + kGap_px, rect.top() + kGap_px};
     else if (rect.center().x() > frame->width() / 2)

@@ -22,8 +22,8 @@ class Tour : public QFrame {
 
   // At the first start of all. Remembered, so it comes once.
   void begin_once();
-  // From the menu, with the keyboard's focus.
-  void begin();
+  // From the menu, with the keyboard's focus. `from`: the first step that is still to be done.
+  void begin(TourStep from);
   void end();
   // The user did what a step asks for.
   void did(TourStep step);

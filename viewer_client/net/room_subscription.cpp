@@ -16,6 +16,7 @@
 #include "osteon/v1/plan.grpc.pb.h"
 #include "osteon/v1/room.grpc.pb.h"
 #include "osteon/v1/watch.grpc.pb.h"
+#include "viewer_client/net/open_requests.hpp"
 
 namespace osteon {
 
@@ -53,16 +54,24 @@ Result<ReceivedBlock> receive(const v1::MeshBlock& wire_block, double pitch_mm) 
   return block;
 }
 
+// Where requests go.
+struct RequestPath {
+  std::shared_ptr<grpc::Channel> channel;  // shared with the stub, which may outlive a rejoin
+  OpenRequests* open;
+};
+
 // One request to the room and its answer.
 template <class Response, class Request>
-Result<Response> ask(const std::shared_ptr<grpc::Channel>& channel,
+Result<Response> ask(const RequestPath& path,
                      grpc::Status (v1::RoomService::Stub::*call)(grpc::ClientContext*, const Request&, Response*),
                      const Request& request) {
   grpc::ClientContext context;
   context.set_deadline(std::chrono::system_clock::now() + kAnswerTime);
+  if (!path.open->add(context)) return failure(ErrorCode::cancelled, "the room is being left");
   Response response;
-  const auto stub = v1::RoomService::NewStub(channel);
+  const auto stub = v1::RoomService::NewStub(path.channel);
   const grpc::Status status = (stub.get()->*call)(&context, request, &response);
+  path.open->remove(context);
   if (status.ok()) return response;
   switch (status.error_code()) {
     case grpc::StatusCode::INVALID_ARGUMENT:
@@ -81,8 +90,8 @@ Result<RoomAnswer> answered(const Response& response, std::optional<int> events 
 }
 
 // The item's present state in the room.
-Result<SceneItem> standing_item(const std::shared_ptr<grpc::Channel>& channel, std::uint32_t id) {
-  const auto status = ask(channel, &v1::RoomService::Stub::GetStatus, v1::GetStatusRequest{});
+Result<SceneItem> standing_item(const RequestPath& path, std::uint32_t id) {
+  const auto status = ask(path, &v1::RoomService::Stub::GetStatus, v1::GetStatusRequest{});
   if (!status) return tl::unexpected(status.error());
   for (const v1::SceneItem& item : status->items())
     if (item.item() == id) return wire::from_wire(item);
@@ -113,17 +122,16 @@ v1::SetSceneItemRequest request_for(const SceneItem& standing, std::uint64_t aut
 
 // `more`: text for the answer in addition to the item's position.
 template <class More>
-Result<RoomAnswer> set_item(const std::shared_ptr<grpc::Channel>& channel, const v1::SetSceneItemRequest& request,
-                            More more) {
-  const auto answer = ask(channel, &v1::RoomService::Stub::SetSceneItem, request);
+Result<RoomAnswer> set_item(const RequestPath& path, const v1::SetSceneItemRequest& request, More more) {
+  const auto answer = ask(path, &v1::RoomService::Stub::SetSceneItem, request);
   if (!answer) return tl::unexpected(answer.error());
   const auto now = wire::from_wire(answer->set());
   if (!now) return tl::unexpected(now.error());
   return RoomAnswer{RoomSeq{answer->room_seq()}, {}, standing_text(*now) + more(*answer, *now)};
 }
 
-Result<RoomAnswer> set_item(const std::shared_ptr<grpc::Channel>& channel, const v1::SetSceneItemRequest& request) {
-  return set_item(channel, request, [](const auto&, const auto&) { return std::string(); });
+Result<RoomAnswer> set_item(const RequestPath& path, const v1::SetSceneItemRequest& request) {
+  return set_item(path, request, [](const auto&, const auto&) { return std::string(); });
 }
 
 // The tools that the window can draw already, without a request to the server.
@@ -156,6 +164,7 @@ struct RoomSubscription::Impl {
   WatchedRoom room;
   std::atomic<bool> ending{false};
   std::atomic<bool> interrupted{false};
+  mutable OpenRequests requests;
 
   // Guards what both readers and the owner use. Never held during a call to the server.
   mutable Mutex mutex{LockRank::leaf};
@@ -188,20 +197,20 @@ struct RoomSubscription::Impl {
   template <class Reader, class Request, class Response>
   auto read_once(OnceCall<Request, Response> call) -> std::optional<decltype(std::declval<Reader>().finish())>;
   Result<void> read_mesh_stream();
-  void fetch_tools(const std::shared_ptr<grpc::Channel>& channel, std::uint64_t author, KnownTools& known);
+  void fetch_tools(const RequestPath& path, std::uint64_t author, KnownTools& known);
   // The same request in the name of the viewer's author.
   template <class Response, class Request>
   Result<Response> ask_as_author(grpc::Status (v1::RoomService::Stub::*call)(grpc::ClientContext*, const Request&,
                                                                              Response*),
                                  Request request) const {
-    const auto [channel, author] = line();
+    const auto [path, author] = line();
     request.set_author(author);
-    return ask(channel, call, request);
+    return ask(path, call, request);
   }
-  // Channel and author of the newest join.
-  std::pair<std::shared_ptr<grpc::Channel>, std::uint64_t> line() const {
+  // Path and author of the newest join.
+  std::pair<RequestPath, std::uint64_t> line() const {
     const MutexLock lock(mutex);
-    return {joined.channel, joined.author.value};
+    return {{joined.channel, &requests}, joined.author.value};
   }
   [[nodiscard]] wire::JoinedRoom newest_join() const {
     const MutexLock lock(mutex);
@@ -240,7 +249,7 @@ Result<void> RoomSubscription::Impl::rejoin() {
   return failure(ErrorCode::cancelled, "stopped");
 }
 
-// Gives the stream's context to the destructor, which cancels it. False: the destructor has already begun.
+// Gives the stream's context to end(), which cancels it. False: it was called already.
 bool RoomSubscription::Impl::enter(Slot slot, grpc::ClientContext& context) {
   const MutexLock lock(mutex);
   if (ending) return false;
@@ -257,7 +266,7 @@ void RoomSubscription::Impl::leave(Slot slot) {
 Result<void> RoomSubscription::Impl::read_mesh_stream() {
   grpc::ClientContext context;
   if (!enter(&Impl::mesh_context, context)) return {};
-  const auto [channel, author] = line();
+  const auto [path, author] = line();
   v1::WatchMeshRequest request;
   request.set_author(author);
   {
@@ -265,7 +274,7 @@ Result<void> RoomSubscription::Impl::read_mesh_stream() {
     if (newest_look) *request.mutable_look() = wire::to_wire(*newest_look);
     said_look = newest_look;
   }
-  const auto stub = v1::WatchService::NewStub(channel);
+  const auto stub = v1::WatchService::NewStub(path.channel);
   const auto reader = stub->WatchMesh(&context, request);
 
   Result<void> outcome;
@@ -326,11 +335,10 @@ void RoomSubscription::Impl::read_mesh() {
 }
 
 // [cutting thread] Fetches the tools that the room has and this program does not.
-void RoomSubscription::Impl::fetch_tools(const std::shared_ptr<grpc::Channel>& channel, std::uint64_t author,
-                                         KnownTools& known) {
+void RoomSubscription::Impl::fetch_tools(const RequestPath& path, std::uint64_t author, KnownTools& known) {
   v1::ListToolsRequest list;
   list.set_author(author);
-  const auto tools = ask(channel, &v1::RoomService::Stub::ListTools, list);
+  const auto tools = ask(path, &v1::RoomService::Stub::ListTools, list);
   if (!tools) return;
   for (const v1::KnownTool& listed : tools->tools()) {
     const Result<Digest> hash = wire::digest_from_wire(listed.tool_hash());
@@ -338,7 +346,7 @@ void RoomSubscription::Impl::fetch_tools(const std::shared_ptr<grpc::Channel>& c
     v1::GetToolRequest request;
     request.set_author(author);
     request.set_tool_hash(listed.tool_hash());
-    const auto answer = ask(channel, &v1::RoomService::Stub::GetTool, request);
+    const auto answer = ask(path, &v1::RoomService::Stub::GetTool, request);
     const Result<Tool> tool = answer ? wire::from_wire(answer->tool()) : tl::unexpected(answer.error());
     if (!tool) {
       log::warn("a tool of the room cannot be drawn", {{"name", listed.name()}, {"reason", tool.error().message}});
@@ -385,9 +393,9 @@ void RoomSubscription::Impl::read_cutting() {
       std::vector<BodyId> bodies;
       for (const std::uint32_t body : message.bodies()) bodies.push_back(BodyId{body});
       bool missed = false;
-      for (const CuttingState& state : states) missed |= known.miss(state.tool_name);
+      for (const CuttingState& state : states) missed |= !state.tool_name.empty() && known.miss(state.tool_name);
       for (const SceneItem& item : items) missed |= known.miss(item.tool);
-      if (missed) fetch_tools(channel, request.author(), known);
+      if (missed) fetch_tools({channel, &requests}, request.author(), known);
       render_queue.put_states(std::move(states), std::move(items), std::move(bodies));
     }
     reader->Finish();
@@ -426,12 +434,12 @@ template <class Reader, class Request, class Response>
 auto RoomSubscription::Impl::read_once(OnceCall<Request, Response> call)
     -> std::optional<decltype(std::declval<Reader>().finish())> {
   while (!stopping()) {
-    const auto [channel, author] = line();
+    const auto [path, author] = line();
     Request request;
     request.set_author(author);
     grpc::ClientContext context;
     if (!enter(&Impl::plan_context, context)) return {};
-    const auto stub = v1::PlanService::NewStub(channel);
+    const auto stub = v1::PlanService::NewStub(path.channel);
     const auto reader = (stub.get()->*call)(&context, request);
     Reader whole;
     Result<void> outcome;
@@ -496,16 +504,19 @@ Result<std::unique_ptr<RoomSubscription>> RoomSubscription::start(const RoomSubs
   return std::unique_ptr<RoomSubscription>(new RoomSubscription(std::move(impl)));
 }
 
+void RoomSubscription::end() {
+  impl_->requests.cancel_all();
+  const MutexLock lock(impl_->mutex);
+  impl_->ending = true;
+  if (impl_->mesh_context != nullptr) impl_->mesh_context->TryCancel();
+  if (impl_->cutting_context != nullptr) impl_->cutting_context->TryCancel();
+  if (impl_->look_context != nullptr) impl_->look_context->TryCancel();
+  if (impl_->plan_context != nullptr) impl_->plan_context->TryCancel();
+  impl_->changed.notify_all();
+}
+
 RoomSubscription::~RoomSubscription() {
-  {
-    const MutexLock lock(impl_->mutex);
-    impl_->ending = true;
-    if (impl_->mesh_context != nullptr) impl_->mesh_context->TryCancel();
-    if (impl_->cutting_context != nullptr) impl_->cutting_context->TryCancel();
-    if (impl_->look_context != nullptr) impl_->look_context->TryCancel();
-    if (impl_->plan_context != nullptr) impl_->plan_context->TryCancel();
-    impl_->changed.notify_all();
-  }
+  end();
   impl_->mesh_thread.join();
   impl_->cutting_thread.join();
   impl_->look_thread.join();
@@ -575,10 +586,10 @@ Result<RoomAnswer> RoomSubscription::remove_body(BodyId body) {
 }
 
 Result<RoomAnswer> RoomSubscription::place(const std::string& tool, const ItemPlace& where, BodyId body) {
-  const auto [channel, author] = impl_->line();
+  const auto [path, author] = impl_->line();
   v1::ListToolsRequest list;
   list.set_author(author);
-  const auto tools = ask(channel, &v1::RoomService::Stub::ListTools, list);
+  const auto tools = ask(path, &v1::RoomService::Stub::ListTools, list);
   if (!tools) return tl::unexpected(tools.error());
   v1::SetSceneItemRequest request;
   request.set_author(author);
@@ -588,34 +599,34 @@ Result<RoomAnswer> RoomSubscription::place(const std::string& tool, const ItemPl
     return failure(ErrorCode::not_found, "the room knows no tool of the name " + tool);
   request.mutable_item()->set_body(body.value);
   put(where, Pose{}, request);
-  return set_item(channel, request);
+  return set_item(path, request);
 }
 
 Result<RoomAnswer> RoomSubscription::move_item(std::uint32_t item, const ItemPlace& where) {
-  const auto [channel, author] = impl_->line();
-  const auto standing = standing_item(channel, item);
+  const auto [path, author] = impl_->line();
+  const auto standing = standing_item(path, item);
   if (!standing) return tl::unexpected(standing.error());
   v1::SetSceneItemRequest request = request_for(*standing, author);
   put(where, standing->pose_bone_item, request);
-  return set_item(channel, request);
+  return set_item(path, request);
 }
 
 Result<RoomAnswer> RoomSubscription::turn_item(std::uint32_t item, double turns) {
-  const auto [channel, author] = impl_->line();
-  const auto standing = standing_item(channel, item);
+  const auto [path, author] = impl_->line();
+  const auto standing = standing_item(path, item);
   if (!standing) return tl::unexpected(standing.error());
   v1::SetSceneItemRequest request = request_for(*standing, author);
   request.set_thread_turns(turns);
-  return set_item(channel, request);
+  return set_item(path, request);
 }
 
 Result<RoomAnswer> RoomSubscription::seat_item(std::uint32_t item, double most_mm) {
-  const auto [channel, author] = impl_->line();
-  const auto standing = standing_item(channel, item);
+  const auto [path, author] = impl_->line();
+  const auto standing = standing_item(path, item);
   if (!standing) return tl::unexpected(standing.error());
   v1::SetSceneItemRequest request = request_for(*standing, author);
   request.set_drive_home_mm(most_mm);
-  return set_item(channel, request, [&](const v1::SetSceneItemResponse& answer, const SceneItem& now) {
+  return set_item(path, request, [&](const v1::SetSceneItemResponse& answer, const SceneItem& now) {
     char way[80];
     std::snprintf(way, sizeof way, "; advanced %.2f mm, %.0f %% of it on bone",
                   (now.pose_bone_item.position_mm - standing->pose_bone_item.position_mm).norm(),
@@ -625,20 +636,20 @@ Result<RoomAnswer> RoomSubscription::seat_item(std::uint32_t item, double most_m
 }
 
 Result<RoomAnswer> RoomSubscription::remove_item(std::uint32_t item) {
-  const auto [channel, author] = impl_->line();
+  const auto [path, author] = impl_->line();
   v1::RemoveSceneItemRequest request;
   request.set_author(author);
   request.set_item(item);
-  const auto answer = ask(channel, &v1::RoomService::Stub::RemoveSceneItem, request);
+  const auto answer = ask(path, &v1::RoomService::Stub::RemoveSceneItem, request);
   return answer ? answered(*answer) : tl::unexpected(answer.error());
 }
 
 Result<RoomAnswer> RoomSubscription::save(const std::string& file_name) {
-  const auto [channel, author] = impl_->line();
+  const auto [path, author] = impl_->line();
   v1::SaveFieldsRequest request;
   request.set_author(author);
   request.set_file_name(file_name);
-  const auto answer = ask(channel, &v1::RoomService::Stub::SaveFields, request);
+  const auto answer = ask(path, &v1::RoomService::Stub::SaveFields, request);
   return answer ? answered(*answer) : tl::unexpected(answer.error());
 }
 

@@ -46,6 +46,8 @@ class RoomSubscription {
                                                                        RenderQueue& render_queue,
                                                                        std::function<bool()> stop);
   ~RoomSubscription();
+  // Ends the streams, and each request that waits for an answer, with an error. Returns at once. Any thread.
+  void end();
 
   [[nodiscard]] const WatchedRoom& room() const;
   // The newest join. It changes after a lost connection.

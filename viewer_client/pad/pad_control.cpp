@@ -31,7 +31,7 @@ PadOrder PadControl::step(const PadState& state) noexcept {
   order.push = push_.held;
   order.push_begins = push_.held && !pushed;
   if (order.push) {
-    const double pulled = std::clamp((state.right_trigger - kTriggerRest) / (1.0 - kTriggerRest), 0.0, 1.0);
+    const double pulled = std::clamp((state.right_trigger - kTriggerPulled) / (1.0 - kTriggerPulled), 0.0, 1.0);
     order.push_n = kLeastPush_n + pulled * (kMostPush_n - kLeastPush_n);
   }
   order.fine = state.shoulder;

@@ -37,7 +37,7 @@ class PadControl {
  public:
   static constexpr double kStickRest = 0.15;
   // Hysteresis: a trigger counts as pulled above kTriggerPulled, until it is below kTriggerRest. The push grows
-  // linearly from kTriggerRest on.
+  // linearly from kTriggerPulled on, so that it begins with the least push.
   static constexpr double kTriggerRest = 0.08, kTriggerPulled = 0.12;
 
   [[nodiscard]] PadOrder step(const PadState& state) noexcept;

@@ -26,10 +26,10 @@ struct BoneScene::Impl {
   BoneActors bone{*renderer};
   ToolActors tools{*renderer};
   StatusText status{*renderer};
-  std::optional<PeopleOverlay> people;
-  std::optional<PlanActors> plan;
   OrientationMarker marker{window};
   Stereo stereo{window, *renderer};
+  std::optional<PeopleOverlay> people;
+  std::optional<PlanActors> plan;
 
   bool smooth = false;
   std::vector<std::string> said;
@@ -54,8 +54,9 @@ BoneScene::Impl::Impl(vtkRenderWindow& on) : window(on) {
   if (auto* culler = vtkFrustumCoverageCuller::SafeDownCast(renderer->GetCullers()->GetLastItem())) {
     culler->SetSortingStyleToFrontToBack();
   }
-  people.emplace(*renderer, window, [this](const Vec3& point_mm) { return bone.normal_at(point_mm); });
-  plan.emplace(*renderer, window);
+  const BonePictures pictures{renderer, &stereo.right()};
+  people.emplace(pictures, window, [this](const Vec3& point_mm) { return bone.normal_at(point_mm); });
+  plan.emplace(pictures, window);
 }
 
 BoneScene::Impl::~Impl() {
@@ -143,11 +144,12 @@ void BoneScene::set_smooth(bool smooth) {
 void BoneScene::draw() {
   impl_->people->show_words(impl_->said, impl_->holding, impl_->hint);
   impl_->people->show_stroke(impl_->stroke_mm);
-  impl_->people->place();
-  impl_->plan->place(stereo() == StereoMode::side_by_side);
   const CameraView view = camera();
+  const bool two_pictures = stereo() == StereoMode::side_by_side;
   impl_->marker.follow(view);
-  impl_->stereo.place(view);
+  impl_->stereo.place(view);  // before what belongs to points of the pictures
+  impl_->people->place(two_pictures);
+  impl_->plan->place(two_pictures);
   impl_->renderer->ResetCameraClippingRange();
   impl_->window.Render();
   impl_->window.WaitForCompletion();

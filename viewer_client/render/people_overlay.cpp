@@ -79,19 +79,21 @@ vtkSmartPointer<vtkActor> shape_actor(vtkAlgorithmOutput* shape, std::uint32_t c
 }  // namespace
 
 struct PeopleOverlay::Impl {
-  vtkRenderer& bone;
+  vtkRenderer& bone;  // the left picture
   vtkRenderWindow& window;
   NormalAt normal_at;
-  vtkNew<vtkRenderer> above;  // drawn over the bone, with the same camera
+  LayerAbove layer;
   vtkNew<vtkArrowSource> arrow;
   vtkNew<vtkSphereSource> ball;
 
+  // A text beside a point, at its place in each picture.
+  using Words = std::array<vtkSmartPointer<vtkTextActor>, LayerAbove::kPictures>;
   struct Drawn {
     Annotation annotation;
     std::vector<Vec3> points_mm;
     vtkSmartPointer<vtkTubeFilter> tube;       // of a line
     vtkSmartPointer<vtkActor> solid, through;  // the same shape: hidden by the bone, and drawn over it
-    vtkSmartPointer<vtkTextActor> words;
+    Words words;
     std::optional<Vec3> normal;  // at a pointer's point
   };
   std::map<std::uint32_t, Drawn> drawn;
@@ -99,14 +101,17 @@ struct PeopleOverlay::Impl {
   std::map<AuthorId, std::string> names;
   struct Tool {
     Pose pose;
-    vtkSmartPointer<vtkTextActor> name;
+    Words name;
   };
   std::map<AuthorId, Tool> tools;
   vtkSmartPointer<vtkTextActor> said = text_actor(kSaidText, kLight), holding = text_actor(kHoldingText, kWarning),
                                 hint = text_actor(kHintText, kLight);
-  std::vector<std::array<int, 4>> taken;  // rectangles of this picture's texts: left, right, bottom, top
+  // Rectangles of each picture's texts: left, right, bottom, top.
+  std::array<std::vector<std::array<int, 4>>, LayerAbove::kPictures> taken;
+  int pictures = 1;
 
-  Impl(vtkRenderer& b, vtkRenderWindow& w, NormalAt n) : bone(b), window(w), normal_at(std::move(n)) {}
+  Impl(const BonePictures& b, vtkRenderWindow& w, NormalAt n)
+      : bone(*b.left), window(w), normal_at(std::move(n)), layer(w, b) {}
 
   Drawn make(const Annotation& annotation);
   void add(const Drawn& one);
@@ -116,19 +121,16 @@ struct PeopleOverlay::Impl {
 
   // Millimetres per pixel at a point's distance from the eye. Not positive: the point is behind the eye.
   [[nodiscard]] double mm_per_px(const Vec3& point_mm) const;
-  [[nodiscard]] std::array<double, 2> on_screen(const Vec3& point_mm);  // from the lower left
-  void put_beside(vtkTextActor* text, const Vec3& point_mm);
+  [[nodiscard]] Words words_in(int size, const Rgb& colour);
+  void add(const Words& words);
+  void remove(const Words& words);
+  static void show(const Words& words, const std::string& text);  // empty: hides it
+  void put_beside(const Words& words, const Vec3& point_mm);
+  void put_beside(vtkTextActor* text, int picture, const Vec3& point_mm);
 };
 
-PeopleOverlay::PeopleOverlay(vtkRenderer& bone, vtkRenderWindow& window, NormalAt normal_at)
+PeopleOverlay::PeopleOverlay(const BonePictures& bone, vtkRenderWindow& window, NormalAt normal_at)
     : impl_(std::make_unique<Impl>(bone, window, std::move(normal_at))) {
-  vtkRenderer* above = impl_->above;
-  window.SetNumberOfLayers(2);
-  above->SetLayer(1);
-  above->InteractiveOff();
-  above->SetActiveCamera(bone.GetActiveCamera());
-  window.AddRenderer(above);
-
   impl_->arrow->InvertOn();  // its tip at the origin
   impl_->arrow->SetTipLength(0.32);
   impl_->arrow->SetTipRadius(0.105);
@@ -143,7 +145,7 @@ PeopleOverlay::PeopleOverlay(vtkRenderer& bone, vtkRenderWindow& window, NormalA
     text->GetPositionCoordinate()->SetCoordinateSystemToNormalizedViewport();
     text->SetPosition(x, y);
     text->SetVisibility(0);
-    above->AddActor2D(text);
+    impl_->layer.add(text);
   };
   fix(impl_->said, 0.5, 0.075);
   impl_->said->GetTextProperty()->SetJustificationToCentered();
@@ -154,7 +156,27 @@ PeopleOverlay::PeopleOverlay(vtkRenderer& bone, vtkRenderWindow& window, NormalA
   impl_->hint->GetTextProperty()->SetJustificationToRight();
 }
 
-PeopleOverlay::~PeopleOverlay() { impl_->window.RemoveRenderer(impl_->above); }
+PeopleOverlay::~PeopleOverlay() = default;
+
+PeopleOverlay::Impl::Words PeopleOverlay::Impl::words_in(int size, const Rgb& colour) {
+  return {text_actor(size, colour), text_actor(size, colour)};
+}
+
+void PeopleOverlay::Impl::add(const Words& words) {
+  for (int picture = 0; picture < LayerAbove::kPictures; ++picture)
+    layer.add(words[static_cast<std::size_t>(picture)], picture);
+}
+
+void PeopleOverlay::Impl::remove(const Words& words) {
+  for (vtkTextActor* text : words) layer.remove(text);
+}
+
+void PeopleOverlay::Impl::show(const Words& words, const std::string& text) {
+  for (vtkTextActor* one : words) {
+    one->SetVisibility(0);
+    if (!text.empty()) one->SetInput(text.c_str());
+  }
+}
 
 std::string PeopleOverlay::Impl::words_of(const Annotation& annotation) const {
   // Each author has one arrow, so its text names the author.
@@ -185,24 +207,26 @@ PeopleOverlay::Impl::Drawn PeopleOverlay::Impl::make(const Annotation& annotatio
   }
   one.solid = shape_actor(shape, annotation.colour, 1.0);
   one.through = shape_actor(shape, annotation.colour, kThrough);
-  one.words = text_actor(kLabelText, kLight);
+  one.words = words_in(kLabelText, kLight);
   const Rgb c = rgb(annotation.colour);
-  one.words->GetTextProperty()->SetFrame(1);
-  one.words->GetTextProperty()->SetFrameWidth(2);
-  one.words->GetTextProperty()->SetFrameColor(c[0], c[1], c[2]);
+  for (vtkTextActor* text : one.words) {
+    text->GetTextProperty()->SetFrame(1);
+    text->GetTextProperty()->SetFrameWidth(2);
+    text->GetTextProperty()->SetFrameColor(c[0], c[1], c[2]);
+  }
   return one;
 }
 
 void PeopleOverlay::Impl::add(const Drawn& one) {
   bone.AddActor(one.solid);
-  above->AddActor(one.through);
-  above->AddActor2D(one.words);
+  layer.add(one.through);
+  add(one.words);
 }
 
 void PeopleOverlay::Impl::remove(const Drawn& one) {
   bone.RemoveActor(one.solid);
-  above->RemoveActor(one.through);
-  above->RemoveActor2D(one.words);
+  layer.remove(one.through);
+  remove(one.words);
 }
 
 void PeopleOverlay::show_annotations(std::span<const Annotation> drawn) {
@@ -239,13 +263,14 @@ void PeopleOverlay::show_names(std::map<AuthorId, std::string> names) { impl_->n
 void PeopleOverlay::show_tools(std::span<const CuttingState> states) {
   std::map<AuthorId, Impl::Tool> shown;
   for (const CuttingState& state : states) {
+    if (state.tool_name.empty()) continue;  // an empty hand is not seen
     auto held = impl_->tools.extract(state.author);
-    Impl::Tool tool = held.empty() ? Impl::Tool{{}, text_actor(kNameText, kName)} : held.mapped();
-    if (held.empty()) impl_->above->AddActor2D(tool.name);
+    Impl::Tool tool = held.empty() ? Impl::Tool{{}, impl_->words_in(kNameText, kName)} : held.mapped();
+    if (held.empty()) impl_->add(tool.name);
     tool.pose = state.pose_bone_tool;
     shown.emplace(state.author, std::move(tool));
   }
-  for (const auto& [author, gone] : impl_->tools) impl_->above->RemoveActor2D(gone.name);
+  for (const auto& [author, gone] : impl_->tools) impl_->remove(gone.name);
   impl_->tools = std::move(shown);
 }
 
@@ -256,7 +281,7 @@ void PeopleOverlay::show_words(const std::vector<std::string>& said, const std::
     actor->SetVisibility(text.empty() ? 0 : 1);
   };
   const auto columns = [&](int size) {
-    return static_cast<std::size_t>(std::max(20.0, 0.62 * impl_->window.GetSize()[0] / (kCharacter * size)));
+    return static_cast<std::size_t>(std::max(20.0, 0.62 * impl_->layer.frame(0).width / (kCharacter * size)));
   };
   std::string lines;
   for (const std::string& one : said) lines += (lines.empty() ? "" : "\n") + wrapped(one, columns(kSaidText), 3);
@@ -280,37 +305,37 @@ double PeopleOverlay::Impl::mm_per_px(const Vec3& point_mm) const {
   return 2.0 * half * (point_mm - eye).dot(sight) / std::max(1, window.GetSize()[1]);
 }
 
-std::array<double, 2> PeopleOverlay::Impl::on_screen(const Vec3& point_mm) {
-  bone.SetWorldPoint(point_mm.x(), point_mm.y(), point_mm.z(), 1.0);
-  bone.WorldToDisplay();
-  return {bone.GetDisplayPoint()[0], bone.GetDisplayPoint()[1]};
+void PeopleOverlay::Impl::put_beside(const Words& words, const Vec3& point_mm) {
+  for (int picture = 0; picture < pictures; ++picture)
+    put_beside(words[static_cast<std::size_t>(picture)], picture, point_mm);
 }
 
 // To the right of the point. If another text is there already, it moves towards the picture's middle row.
-void PeopleOverlay::Impl::put_beside(vtkTextActor* text, const Vec3& point_mm) {
-  const auto [x, y] = on_screen(point_mm);
-  const int* size = window.GetSize();
-  const bool seen = mm_per_px(point_mm) > 0.0 && x >= 0 && y >= 0 && x < size[0] && y < size[1];
+void PeopleOverlay::Impl::put_beside(vtkTextActor* text, int picture, const Vec3& point_mm) {
+  const auto [x, y] = layer.on_screen(picture, {point_mm.x(), point_mm.y(), point_mm.z()});
+  const LayerAbove::Frame frame = layer.frame(picture);
+  const bool seen = mm_per_px(point_mm) > 0.0 && x >= 0 && y >= 0 && x < frame.width && y < frame.height;
   text->SetVisibility(seen ? 1 : 0);
   if (!seen) return;
   double box[4];
   text->SetPosition(0, 0);
-  text->GetBoundingBox(above, box);
+  text->GetBoundingBox(layer.above(picture), box);
   const int width = static_cast<int>(box[1] - box[0]) + 1, height = static_cast<int>(box[3] - box[2]) + 1;
-  // To the left where the window ends on the right.
+  // To the left where the picture ends on the right.
   int left = static_cast<int>(std::lround(x + kBeside)), bottom = static_cast<int>(std::lround(y)) - height / 2;
-  if (left + width > size[0]) left = static_cast<int>(std::lround(x - kBeside)) - width;
-  const bool upwards = y < 0.5 * size[1];
+  if (left + width > frame.width) left = static_cast<int>(std::lround(x - kBeside)) - width;
+  const bool upwards = y < 0.5 * frame.height;
+  auto& texts = taken[static_cast<std::size_t>(picture)];
   for (bool free = false; !free;) {
     free = true;
-    for (const auto& [l, r, b, t] : taken) {
+    for (const auto& [l, r, b, t] : texts) {
       if (left > r || left + width < l || bottom > t || bottom + height < b) continue;
       bottom = upwards ? t + 4 : b - height - 4;
       free = false;
       break;
     }
   }
-  taken.push_back({left, left + width, bottom, bottom + height});
+  texts.push_back({left, left + width, bottom, bottom + height});
   text->SetPosition(left - box[0], bottom - box[2]);
 }
 
@@ -350,38 +375,41 @@ void PeopleOverlay::Impl::place(Drawn& one) {
   one.through->SetUserMatrix(matrix);
 
   const std::string words = wrapped(words_of(one.annotation), 40, 4);
-  one.words->SetVisibility(0);
+  show(one.words, words);
   if (words.empty()) return;
-  one.words->SetInput(words.c_str());
   put_beside(one.words, beside);
 }
 
-void PeopleOverlay::place() {
-  impl_->taken.clear();
-  for (vtkTextActor* text : {impl_->said.Get(), impl_->holding.Get(), impl_->hint.Get()}) {
-    if (text->GetVisibility() == 0) continue;
-    double box[4];
-    text->GetBoundingBox(impl_->above, box);
-    const int* at = text->GetPositionCoordinate()->GetComputedViewportValue(impl_->above);
-    const auto edge = [&](int which) { return at[which / 2] + static_cast<int>(box[which]); };
-    impl_->taken.push_back({edge(0), edge(1), edge(2), edge(3)});
+void PeopleOverlay::place(bool two_pictures) {
+  impl_->pictures = two_pictures ? LayerAbove::kPictures : 1;
+  impl_->layer.place(true, two_pictures);  // texts are measured in their pictures
+  for (int picture = 0; picture < impl_->pictures; ++picture) {
+    auto& texts = impl_->taken[static_cast<std::size_t>(picture)];
+    texts.clear();
+    for (vtkTextActor* text : {impl_->said.Get(), impl_->holding.Get(), impl_->hint.Get()}) {
+      if (text->GetVisibility() == 0) continue;
+      double box[4];
+      text->GetBoundingBox(impl_->layer.above(picture), box);
+      const int* at = text->GetPositionCoordinate()->GetComputedViewportValue(impl_->layer.above(picture));
+      const auto edge = [&](int which) { return at[which / 2] + static_cast<int>(box[which]); };
+      texts.push_back({edge(0), edge(1), edge(2), edge(3)});
+    }
   }
   for (auto& [id, one] : impl_->drawn) impl_->place(one);
   if (impl_->stroke) impl_->place(*impl_->stroke);
   bool named = false;
   for (auto& [author, tool] : impl_->tools) {
     const auto name = impl_->names.find(author);
-    tool.name->SetVisibility(0);
+    Impl::show(tool.name, name == impl_->names.end() ? std::string() : name->second);
     if (name == impl_->names.end() || name->second.empty()) continue;
     named = true;
-    tool.name->SetInput(name->second.c_str());
     const Vec3& tip = tool.pose.position_mm;
     impl_->put_beside(tool.name, tip - kAlongTool * impl_->mm_per_px(tip) * tool.pose.direction(Vec3::UnitZ()));
   }
   bool words = false;
   for (vtkTextActor* text : {impl_->said.Get(), impl_->holding.Get(), impl_->hint.Get()})
     words = words || text->GetVisibility() != 0;
-  impl_->above->SetDraw(words || named || impl_->stroke || !impl_->drawn.empty());
+  impl_->layer.place(words || named || impl_->stroke || !impl_->drawn.empty(), two_pictures);
 }
 
 }  // namespace osteon

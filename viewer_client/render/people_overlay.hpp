@@ -12,8 +12,8 @@
 
 #include "common/mechanics/cutting_state.hpp"
 #include "common/tools/annotation.hpp"
+#include "viewer_client/render/layer_above.hpp"
 
-class vtkRenderer;
 class vtkRenderWindow;
 
 namespace osteon {
@@ -23,8 +23,8 @@ class PeopleOverlay {
   // The outer normal of the surface near a point, bone frame. None if no surface is near.
   using NormalAt = std::function<std::optional<Vec3>(const Vec3&)>;
 
-  // Both must outlive it.
-  PeopleOverlay(vtkRenderer& bone, vtkRenderWindow& window, NormalAt normal_at);
+  // All must outlive it.
+  PeopleOverlay(const BonePictures& bone, vtkRenderWindow& window, NormalAt normal_at);
   ~PeopleOverlay();
 
   // Annotations that are not in the list vanish.
@@ -34,11 +34,12 @@ class PeopleOverlay {
   void show_names(std::map<AuthorId, std::string> names);
   // The names of the tools' people are shown beside these tools.
   void show_tools(std::span<const CuttingState> states);
-  // Each text has its own lines. A line longer than the window's width is wrapped. Empty: nothing.
+  // Each text has its own lines. A line longer than the picture's width is wrapped. Empty: nothing.
   void show_words(const std::vector<std::string>& said, const std::string& holding, const std::string& hint);
 
-  // Call this before each picture, because the camera may have moved.
-  void place();
+  // Call this before each picture, because the camera may have moved. `two_pictures`: side by side. Then names and
+  // words are in both.
+  void place(bool two_pictures);
 
  private:
   struct Impl;

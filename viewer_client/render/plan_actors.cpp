@@ -84,9 +84,9 @@ std::uint32_t colour_of(StructureKind kind) {
 }
 
 struct PlanActors::Impl {
-  vtkRenderer& bone;
+  vtkRenderer& bone;  // the left picture
   vtkRenderWindow& window;
-  vtkNew<vtkRenderer> above;  // drawn over the bone, with the same camera
+  LayerAbove layer;
   struct Drawn {
     vtkSmartPointer<vtkActor> in_bone, through;  // hidden by the bone, and drawn over it
   };
@@ -99,18 +99,10 @@ struct PlanActors::Impl {
   std::vector<Axis> axes;
   bool planned_on = false, risks_on = false;
 
-  Impl(vtkRenderer& picture, vtkRenderWindow& in) : bone(picture), window(in) {
-    above->SetLayer(1);
-    above->InteractiveOff();
-    above->SetActiveCamera(bone.GetActiveCamera());
-    window.AddRenderer(above);
-  }
+  Impl(const BonePictures& pictures, vtkRenderWindow& in) : bone(*pictures.left), window(in), layer(in, pictures) {}
   Impl(const Impl&) = delete;
   Impl& operator=(const Impl&) = delete;
-  ~Impl() {
-    clear();
-    window.RemoveRenderer(above);
-  }
+  ~Impl() { clear(); }
 
   void add_surface(const SurgicalPlan::Structure& structure);
   void add_axis(const SurgicalPlan::Axis& axis, const Box& around);
@@ -178,9 +170,9 @@ void PlanActors::Impl::clear() {
   for (const auto* group : {&planned, &risks})
     for (const Drawn& drawn : *group) {
       bone.RemoveActor(drawn.in_bone);
-      above->RemoveActor(drawn.through);
+      layer.remove(drawn.through);
     }
-  for (const Axis& axis : axes) above->RemoveActor2D(axis.name);
+  for (const Axis& axis : axes) layer.remove(axis.name);
   planned.clear();
   risks.clear();
   axes.clear();
@@ -196,7 +188,7 @@ void PlanActors::Impl::apply() const {
   for (const Axis& axis : axes) axis.name->SetVisibility(planned_on ? 1 : 0);
 }
 
-PlanActors::PlanActors(vtkRenderer& bone, vtkRenderWindow& window) : impl_(new Impl(bone, window)) {}
+PlanActors::PlanActors(const BonePictures& bone, vtkRenderWindow& window) : impl_(new Impl(bone, window)) {}
 
 PlanActors::~PlanActors() = default;
 
@@ -230,9 +222,9 @@ void PlanActors::show(const SurgicalPlan& plan) {
   for (const auto* group : {&impl_->planned, &impl_->risks})
     for (const Impl::Drawn& drawn : *group) {
       impl_->bone.AddActor(drawn.in_bone);
-      impl_->above->AddActor(drawn.through);
+      impl_->layer.add(drawn.through);
     }
-  for (const Impl::Axis& axis : impl_->axes) impl_->above->AddActor2D(axis.name);
+  for (const Impl::Axis& axis : impl_->axes) impl_->layer.add(axis.name);
   impl_->apply();
 }
 
@@ -255,7 +247,7 @@ double PlanActors::Impl::mm_per_px(const Vec3& point_mm) const {
 
 void PlanActors::place(bool two_pictures) {
   const bool any = (impl_->planned_on && !impl_->planned.empty()) || (impl_->risks_on && !impl_->risks.empty());
-  impl_->above->SetDraw(any && !two_pictures ? 1 : 0);
+  impl_->layer.place(any, two_pictures);
   if (!impl_->planned_on) return;
   for (const Impl::Axis& axis : impl_->axes) {
     const double radius_mm = kAxisWidth_px * std::max(1e-3, impl_->mm_per_px(0.5 * (axis.from_mm + axis.to_mm)));

@@ -4,8 +4,8 @@
 #include <memory>
 
 #include "common/surface/surgical_plan.hpp"
+#include "viewer_client/render/layer_above.hpp"
 
-class vtkRenderer;
 class vtkRenderWindow;
 
 namespace osteon {
@@ -15,8 +15,8 @@ namespace osteon {
 
 class PlanActors {
  public:
-  // `bone`: the picture of the bone, which hides what is behind it. Both must outlive it.
-  PlanActors(vtkRenderer& bone, vtkRenderWindow& window);
+  // `bone`: the pictures of the bone, which hides what is behind it. All must outlive it.
+  PlanActors(const BonePictures& bone, vtkRenderWindow& window);
   ~PlanActors();
 
   void show(const SurgicalPlan& plan);
@@ -24,7 +24,7 @@ class PlanActors {
   void set_planned(bool on);
   void set_risks(bool on);
   // Gives lines their width on the screen. Call this before each picture. `two_pictures`: the window has two pictures
-  // side by side. Then nothing is drawn through the bone, and axes have no names.
+  // side by side.
   void place(bool two_pictures);
 
  private:

@@ -2,7 +2,7 @@
 
 #include <vtkCamera.h>
 #include <vtkNew.h>
-#include <vtkProp3D.h>
+#include <vtkProp.h>
 #include <vtkPropCollection.h>
 #include <vtkRenderWindow.h>
 #include <vtkRenderer.h>
@@ -42,14 +42,13 @@ struct Stereo::Impl {
   vtkNew<vtkRenderer> right;
   StereoMode mode = StereoMode::off;
 
-  // The same actors. Names and texts belong to pixels of the window, so they are in the left picture only.
+  // The same actors. Texts in corners have their place in each picture.
   void share_actors() {
     right->RemoveAllViewProps();
     vtkPropCollection* props = scene.GetViewProps();
     vtkCollectionSimpleIterator at;
     props->InitTraversal(at);
-    while (vtkProp* prop = props->GetNextProp(at))
-      if (vtkProp3D::SafeDownCast(prop) != nullptr) right->AddViewProp(prop);
+    while (vtkProp* prop = props->GetNextProp(at)) right->AddViewProp(prop);
   }
 };
 
@@ -57,6 +56,8 @@ Stereo::Stereo(vtkRenderWindow& window, vtkRenderer& scene) : impl_(std::make_un
 Stereo::~Stereo() = default;
 
 StereoMode Stereo::mode() const { return impl_->mode; }
+
+vtkRenderer& Stereo::right() const { return *impl_->right; }
 
 bool Stereo::set(StereoMode mode) {
   vtkRenderWindow& window = impl_->window;

@@ -29,6 +29,8 @@ class Stereo {
   // A mode that the window does not have stays off, and the answer is false.
   [[nodiscard]] bool set(StereoMode mode);
   [[nodiscard]] StereoMode mode() const;
+  // The picture of the right eye. It is drawn side by side only.
+  [[nodiscard]] vtkRenderer& right() const;
   // Places both pictures. `view` is between the eyes. Call this before each picture.
   void place(const CameraView& view);
 

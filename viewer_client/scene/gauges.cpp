@@ -35,7 +35,7 @@ double rounded(double value, double step) { return std::round(value / step) * st
 }  // namespace
 
 std::string gauge_text(const CuttingState& state) {
-  std::string text = state.tool_name + ", " + std::string(word(state.phase));
+  std::string text = (state.tool_name.empty() ? "empty hand" : state.tool_name) + ", " + std::string(word(state.phase));
   text += line("\n%.0f rpm", rounded(state.spindle_rpm, 1.0));
   text += line("\nforce %.1f N", rounded(state.force_physical_N.norm(), 0.1));
   text += line("\ndepth %.1f mm", rounded(state.depth_mm, 0.1));

@@ -31,11 +31,18 @@ std::optional<PictureAxes> axes_of(const CameraView& view) {
 
 void ToolPointer::take(const std::string& tool) {
   input_.tool = tool;
-  input_.push = false;
+  input_.empty_hand = input_.push = false;
   input_.spindle_rpm = 0.0;
   turn_.setIdentity();
   roll_rad_ = 0.0;
   aim();
+}
+
+void ToolPointer::put_down() {
+  input_.empty_hand = true;
+  input_.push = false;
+  input_.spindle_rpm = 0.0;
+  leave();
 }
 
 void ToolPointer::move(const SightRay& ray, const SurfaceScene& surface) {
@@ -99,7 +106,7 @@ void ToolPointer::leave() {
 }
 
 bool ToolPointer::press() {
-  if (!input_.on_bone || input_.tool.empty()) return false;
+  if (!input_.on_bone || input_.empty_hand) return false;
   input_.push = true;
   return true;
 }

@@ -15,6 +15,8 @@ class ToolPointer {
  public:
   // The tool that the hand is to hold. Its turn begins anew.
   void take(const std::string& tool);
+  // The hand is empty, as at the beginning.
+  void put_down();
   void set_irrigation(bool on) { input_.irrigation = on; }
   void set_suction(bool on) { input_.suction = on; }
   void set_spindle_speed(double rpm) { input_.spindle_rpm = rpm; }  // 0: the tool's own
@@ -52,7 +54,7 @@ class ToolPointer {
   [[nodiscard]] const std::optional<SurfaceHit>& hit() const { return hit_; }
 
  private:
-  PointerInput input_;
+  PointerInput input_{.empty_hand = true};
   std::optional<SurfaceHit> hit_;
   Eigen::Quaterniond turn_ = Eigen::Quaterniond::Identity();  // of the tool, away from the normal, bone frame
   double roll_rad_ = 0;

@@ -271,7 +271,7 @@ TEST(SubVolumeInput, OfACaseInItsSourceIsThatOfTheSource) {
 TEST_F(SubVolumeProgram, SaysInOneSentenceWhatIsWrong) {
   fs::create_directories(folder_ / "out");
   expect_sentence(run({"--out", path("out")}), "already there");
-  expect_sentence(run({"--carve", path("none.yaml")}), "there is no script");
+  expect_sentence(run({"--carve", path("none.yaml")}), "; check its name");
   expect_sentence(test::run(OSTEON_IMPORT_PROGRAM, {"report", path("none")}), "there is no file or folder");
   expect_sentence(run({"--subdivisions", "9"}), "--subdivisions");
   ASSERT_EQ(run({"--out", path("case")}, "ct").exit_code, 0);

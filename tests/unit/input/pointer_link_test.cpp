@@ -33,7 +33,7 @@ PointerInput an_input() {
   input.target_mm = {1.25, -20.5, 300.0};
   input.rotation_bone_tool = Eigen::Quaterniond(0.5, -0.5, 0.5, 0.5);
   input.on_bone = input.push = input.fine = true;
-  input.irrigation = input.suction = true;
+  input.irrigation = input.suction = input.empty_hand = true;
   input.push_n = 29.0;
   input.spindle = 0.75;
   input.spindle_rpm = 1200.0;
@@ -129,7 +129,7 @@ std::vector<json> no_number(double least, double most) {
 }
 
 // Fields that an older window does not send.
-const std::set<std::string> kOptional{"irrigation", "suction"};
+const std::set<std::string> kOptional{"irrigation", "suction", "empty_hand"};
 
 // Each value alone, and the absence of a field that must be there, is refused with a sentence that names the field.
 void expect_each_refused(const std::string& valid, const Wrong& wrong, Refusal refusal) {
@@ -158,6 +158,7 @@ TEST(PointerMessage, EachFieldOfTheWindowIsChecked) {
                        {"on_bone", kNoBool},
                        {"irrigation", kNoBool},
                        {"suction", kNoBool},
+                       {"empty_hand", kNoBool},
                        {"push", kNoBool},
                        {"fine", kNoBool},
                        {"push_n", no_number(kLeastPush_n, kMostPush_n)},

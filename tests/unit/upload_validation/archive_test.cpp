@@ -141,6 +141,28 @@ TEST(CaseArchive, DamagedAndOtherFilesAreSaid) {
   EXPECT_EQ(missing.error().code, ErrorCode::not_found);
 }
 
+// Readers find the files by the record at the end, and by the list before it, whose entries begin with PK\1\2. Whoever
+// damages one bit of them has removed no file.
+TEST(CaseArchive, ADamagedListOfFilesIsNoMissingFile) {
+  const Bytes whole = zip(kCase);
+  const std::string_view text(reinterpret_cast<const char*>(whole.data()), whole.size());
+  std::vector<std::size_t> places;
+  for (std::size_t at = text.find("PK\1\2"); at != std::string_view::npos; at = text.find("PK\1\2", at + 1))
+    for (std::size_t i = 0; i < 4; ++i) places.push_back(at + i);
+  ASSERT_EQ(places.size(), 8u);
+  for (std::size_t at = text.rfind("PK\5\6"); at < whole.size(); ++at) places.push_back(at);
+  ASSERT_EQ(places.size(), 8u + 22u);
+  for (const std::size_t at : places)
+    for (int bit = 0; bit < 8; ++bit) {
+      Bytes flipped = whole;
+      flipped[at] ^= static_cast<std::byte>(1 << bit);
+      const auto out = unpack(flipped);
+      if (out) continue;  // the files were found all the same
+      EXPECT_NE(out.error().message.find("is not a sound zip archive"), std::string::npos)
+          << at << ", bit " << bit << ": " << out.error().message;
+    }
+}
+
 TEST(CaseArchive, AFullDiskIsPassedOn) {
   const auto out =
       unpack_case(zip(kCase), "a.zip", {}, [](std::string_view, std::span<const std::byte>) -> Result<void> {

@@ -343,6 +343,10 @@ TEST_F(CaseFileTest, TheCommandsPackAndUnpack) {
   refused({"pack", temp_ / "case", temp_ / "bone.rar"}, "such as skull.osteon");
   refused({"pack", temp_ / "out", temp_ / "b.osteon"}, "case.json");
   refused({"unpack", file}, "--out");
+  // Whoever gives the file instead of a folder or a scan is told how to make the folder.
+  const std::vector<std::vector<std::string>> instead{
+      {"info", file}, {"ct", file, "--out", temp_ / "ct"}, {"series", file}, {"report", file}};
+  for (const auto& command : instead) refused(command, "osteon-import unpack " + file + " --out FOLDER");
   refused({"unpack", file, "--out", temp_ / "x", "--into", temp_ / "y"}, "--into");
 }
 

@@ -3,12 +3,15 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <numbers>
+#include <span>
 
 #include "picture.hpp"
 #include "synthetic.hpp"
 #include "viewer_client/render/plan_actors.hpp"
+#include "viewer_client/scene/stroke.hpp"
 
 namespace osteon {
 namespace {
@@ -19,6 +22,7 @@ using test::from_front;
 using test::kHeight;
 using test::kRadius_mm;
 using test::kWidth;
+using test::on_front;
 using test::sphere_mesh;
 
 class ScenePicture : public test::SpherePicture {
@@ -92,6 +96,50 @@ TEST_F(ScenePicture, AnOpenBoneShowsItsInside) {
   const Image open = drawn();
   const Vec3 middle = colour(open, kWidth / 2, kHeight / 2);
   EXPECT_GT(middle.sum(), colour(open, 4, 4).sum() + 150.0);
+}
+
+// The name of a tool's person, an annotation and the name of a planned axis belong to both eyes.
+TEST_F(ScenePicture, EyesSideBySideHaveTheSameNames) {
+  CuttingState state;
+  state.author = AuthorId{7};
+  state.tool_name = "burr-round-5";
+  state.pose_bone_tool = state.pose_bone_device = pose_along(Vec3(0, -20, 0), -Vec3::UnitZ());
+  scene().show_tools(std::span(&state, 1));
+  Annotation label{.id = 2, .author = AuthorId{3}, .kind = AnnotationKind::label, .words = "nerve", .colour = 0x10e040};
+  label.points.push_back(in_steps(on_front(-0.2, -0.6)));
+  SurgicalPlan plan;
+  plan.axes = {{"shaft", Vec3(-10, 0, 0), Vec3::UnitZ()}};
+  scene().show_plan(plan);
+  scene().look(from_front(160.0));
+  const auto differing_in_halves = [&](const Image& both) {
+    std::array<int, 2> differing{};
+    for (const bool right : {false, true}) {
+      scene().look(right ? right_eye(from_front(160.0)) : left_eye(from_front(160.0)));
+      const Image eye = drawn();
+      for (int y = 0; y < kHeight; ++y)
+        for (int x = 0; x < kWidth / 2; ++x)
+          differing[right ? 1 : 0] += both.at((right ? kWidth / 2 : 0) + x, y) != eye.at(kWidth / 4 + x, y) ? 1 : 0;
+    }
+    scene().look(from_front(160.0));
+    return differing;
+  };
+  ASSERT_TRUE(scene().set_stereo(StereoMode::side_by_side));
+  const Image nameless = drawn();
+  scene().show_names({{AuthorId{7}, "Ada"}});
+  scene().show_annotations(std::span(&label, 1));
+  scene().show_planned(true);
+  const Image both = drawn();
+  std::array<int, 2> changed{};
+  for (int y = 0; y < kHeight; ++y)
+    for (int x = 0; x < kWidth; ++x) changed[x < kWidth / 2 ? 0 : 1] += both.at(x, y) != nameless.at(x, y) ? 1 : 0;
+  EXPECT_GT(changed[0], 500);
+  EXPECT_NEAR(changed[1], changed[0], 0.1 * changed[0]);
+  ASSERT_TRUE(scene().set_stereo(StereoMode::off));
+  for (const int differing : differing_in_halves(both)) EXPECT_LT(differing, 0.2 * changed[0]);
+  scene().show_names({});
+  scene().show_annotations({});
+  scene().show_planned(false);
+  scene().show_tools({});
 }
 
 TEST_F(ScenePicture, EyesSideBySideAreTwoWholePictures) {

@@ -132,6 +132,16 @@ TEST_F(PeoplePicture, AToolIsNamedByItsPerson) {
   EXPECT_EQ(differing_pixels(drawn(), before), 0);
 }
 
+TEST_F(PeoplePicture, AnEmptyHandHasNeitherToolNorName) {
+  const Image before = drawn();
+  CuttingState state;
+  state.author = AuthorId{7};
+  state.pose_bone_tool = state.pose_bone_device = pose_along(Vec3::Zero(), -Vec3::UnitZ());
+  window_->scene().show_names({{AuthorId{7}, "Ada"}});
+  window_->scene().show_tools(std::span(&state, 1));
+  EXPECT_EQ(differing_pixels(drawn(), before), 0);
+}
+
 TEST_F(PeoplePicture, WordsStandBelowAndWhatHoldsAbove) {
   const auto changed_rows = [&](const Image& image) {
     std::pair<int, int> rows{kHeight, -1};

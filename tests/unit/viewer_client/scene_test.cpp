@@ -373,6 +373,8 @@ TEST(Gauges, NameToolForceAndDepth) {
   state.on_metal = false;
   state.irrigation = state.suction = true;
   state.flutes_full = 0.62;
+  CuttingState empty;
+  EXPECT_TRUE(gauge_text(empty).starts_with("empty hand, idle\n")) << gauge_text(empty);
   EXPECT_NE(gauge_text(state).find("\ndepth 0.0 mm\nflutes 62 % full\nirrigation\nsuction\n"), std::string::npos)
       << gauge_text(state);
 }

@@ -863,6 +863,18 @@
         <source>The window was busy for a second, so the hand stopped pushing. Press again.</source>
         <translation>Das Fenster war eine Sekunde beschäftigt. Die Hand drückt nicht mehr. Neu drücken.</translation>
     </message>
+    <message>
+        <source>Checking %1</source>
+        <translation>%1 wird geprüft</translation>
+    </message>
+    <message>
+        <source>%1 was damaged and is made anew.</source>
+        <translation>%1 war beschädigt und wird neu erzeugt.</translation>
+    </message>
+    <message>
+        <source>The unpacked copy of %1 was damaged and is removed. Open the file again.</source>
+        <translation>Die entpackte Kopie von %1 war beschädigt und ist entfernt. Die Datei neu öffnen.</translation>
+    </message>
 </context>
 <context>
     <name>PadHand</name>

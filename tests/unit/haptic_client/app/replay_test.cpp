@@ -6,6 +6,8 @@
 
 #include "haptic_client/app/record_file.hpp"
 #include "haptic_client/device/recorded_device.hpp"
+#include "haptic_client/simulation/played_pointer.hpp"
+#include "haptic_client/simulation/pointer_session.hpp"
 #include "tests/support/temp_dir.hpp"
 #include "tests/unit/haptic_client/bench.hpp"
 
@@ -37,24 +39,27 @@ PlanStep burr() {
   return step;
 }
 
-TickRow row_of(Bench& bench, const SessionTick& tick) {
+TickRow row_of(haptic::Session& session, const SessionTick& tick) {
   TickRow row;
   row.mono_ns = static_cast<std::int64_t>(1'000'000 * tick.report.state_seq);
+  row.phase = tick.order.phase;
+  row.pointer_source = tick.pointer_source;
   row.report = tick.report;
   row.reading = tick.reading;
   row.commanded_rpm = tick.commanded_rpm;
   row.rendered = {tick.report.device.force_n, tick.report.device.torque_nmm};
   row.take_up = tick.order.take_up;
   row.taken_up_at = {tick.order.hand.target_mm, tick.order.rotation};
-  row.mapping = bench.session().loop().mapping();
+  row.mapping = session.loop().mapping();
   return row;
 }
 
-RecordingInfo info_of(Bench& bench) {
+RecordingInfo info_of(haptic::Session& session) {
   RecordingInfo info;
-  info.device = bench.session().device().name();
-  info.limits = bench.session().device().limits();
-  info.loop = bench.session().loop().params();
+  info.device = session.device().name();
+  info.limits = session.device().limits();
+  info.loop = session.loop().params();
+  for (const ToolModel& model : session.plan().tools) info.tools.push_back({model.tool.name, "", 0.0});
   return info;
 }
 
@@ -69,12 +74,12 @@ struct Session {
 Session record(const Case& bone, const std::vector<PlanStep>& plan, const SimulatedDeviceParams& device,
                const std::filesystem::path& file, const std::function<Pose(std::uint64_t)>& mount = {}) {
   Bench bench(bone, plan, device);
-  Result<RecordFile> recording = RecordFile::create(file, info_of(bench));
+  Result<RecordFile> recording = RecordFile::create(file, info_of(bench.session()));
   EXPECT_TRUE(recording) << recording.error().message;
   Session session;
   if (mount) bench.session().loop().see_bone(mount(0));
   bench.run([&](const SessionTick& tick) {
-    const TickRow row = row_of(bench, tick);
+    const TickRow row = row_of(bench.session(), tick);
     EXPECT_TRUE(recording->append({&row, 1}));
     session.forces.push_back(tick.report.coupling.force_n);
     if (mount) bench.session().loop().see_bone(mount(tick.report.state_seq));
@@ -117,6 +122,82 @@ TEST(Replay, MakesTheSameCutsAndForces) {
     std::printf("  %s: %zu ticks, %zu cuts, field %.12s\n", name, made.forces.size(), made.cuts.size(),
                 made.field_hash.c_str());
   }
+}
+
+// The plan of a pointer's hand with two tools.
+ReadyPlan pointed(const Case& bone) {
+  const FreeHandOptions first{.tool = "drill-3.2", .toward = Vec3::UnitZ(), .at_mm = Vec3(0.1, -0.2, 0)};
+  Result<ReadyPlan> plan = make_pointed_hand(first, bone, {*find_tool("drill-3.2"), *find_tool("burr-round-5")});
+  EXPECT_TRUE(plan) << plan.error().message;
+  return *plan;
+}
+
+// It rests, drills, takes the bur, burrs while it moves, and leaves the bone.
+Session record_pointer(const Case& bone, const std::filesystem::path& file) {
+  PointerExchange exchange;
+  const SimulatedDeviceParams device{"pointer", SimulatedDeviceParams{}.limits};
+  auto made = std::make_unique<PointerSession>(pointed(bone), exchange, device, 0.0);
+  PointerSession& hand = *made;
+  Bench bench(bone, std::move(made));
+  Result<RecordFile> recording = RecordFile::create(file, info_of(hand));
+  EXPECT_TRUE(recording) << recording.error().message;
+  Session session;
+  PointerCommand command{.target_mm = Vec3(0.1, -0.2, 0),
+                         .rotation = pose_along(Vec3::Zero(), Vec3::UnitZ()).rotation,
+                         .on_bone = true,
+                         .push_n = 29.0,
+                         .spindle = 1.0,
+                         .empty_hand = false,
+                         .source = PointerSource::pen};
+  struct Act {
+    int ticks, tool;
+    bool push;
+    Vec3 to_mm;
+  };
+  const Vec3 here(0.1, -0.2, 0), there(-3.2, 2.3, 0);
+  for (const Act& act :
+       {Act{1500, 0, false, here}, Act{2500, 0, true, here}, Act{1200, 0, false, here}, Act{1500, 1, false, there},
+        Act{1500, 1, true, there + Vec3(0, 1.5, 0)}, Act{1000, 1, false, there}}) {
+    for (int i = 0; i < act.ticks; ++i) {
+      if (i % 50 == 0) {
+        command.tool = act.tool;
+        command.push = act.push;
+        command.target_mm = act.push ? command.target_mm + 0.03 * (act.to_mm - command.target_mm) : act.to_mm;
+        ++command.number;
+        exchange.commands.store(command);
+      }
+      const SessionTick tick = bench.tick();
+      const TickRow row = row_of(hand, tick);
+      EXPECT_TRUE(recording->append({&row, 1}));
+      session.forces.push_back(tick.report.coupling.force_n);
+      bench.follow();
+    }
+  }
+  session.field_hash = to_hex(bench.replica().committed().hash());
+  session.cuts = bench.cuts();
+  EXPECT_TRUE(recording->finish({session.field_hash, session.cuts.size(), 0}));
+  return session;
+}
+
+TEST(Replay, OfAPointerMakesTheSameCutsAndForces) {
+  const osteon::test::TempDir temp;
+  const Case bone = block_case();
+  const Session made = record_pointer(bone, temp / "a.h5");
+  EXPECT_GT(made.cuts.size(), 100u);
+  EXPECT_NE(made.cuts.front().tool, made.cuts.back().tool);
+  Result<std::unique_ptr<RecordedDevice>> device = make_recorded_device(temp / "a.h5");
+  ASSERT_TRUE(device) << device.error().message;
+  RecordedDevice& recorded = **device;
+  EXPECT_TRUE(recorded.session().of_pointer());
+  EXPECT_GE(recorded.session().take_ups.size(), 2u);
+  for (const PointerTick& tick : recorded.session().pointer) ASSERT_EQ(tick.source, 2) << "a pen";
+  Bench bench(bone, std::make_unique<PlayedPointerSession>(pointed(bone), recorded, recorded.session().force_scale));
+  Session again;
+  bench.run([&](const SessionTick& tick) { again.forces.push_back(tick.report.coupling.force_n); });
+  EXPECT_TRUE(recorded.over());
+  EXPECT_EQ(to_hex(bench.replica().committed().hash()), made.field_hash);
+  EXPECT_EQ(bench.cuts(), made.cuts);
+  EXPECT_EQ(again.forces, made.forces);
 }
 
 // A bone that moved on its mount moves again, even if the recording is played on a bone without a mount. Tools start,

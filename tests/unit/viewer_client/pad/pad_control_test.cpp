@@ -42,13 +42,16 @@ TEST(PadStick, ItBeginsWithoutAStepAndWithoutACorner) {
 TEST(PadControl, TheRightTriggerPushesFrom1To40NewtonsInProportion) {
   PadControl control;
   EXPECT_FALSE(control.step({}).push);
-  constexpr double kRest = PadControl::kTriggerRest;
-  for (const double share : {0.1, 0.25, 0.5, 1.0}) {
-    const PadOrder order = control.step(pulled(kRest + share * (1.0 - kRest)));
+  constexpr double kPulled = PadControl::kTriggerPulled;
+  // The softest push is the first one.
+  for (const double share : {1e-6, 0.1, 0.25, 0.5, 1.0}) {
+    const PadOrder order = control.step(pulled(kPulled + share * (1.0 - kPulled)));
     EXPECT_TRUE(order.push);
     EXPECT_NEAR(order.push_n, 1.0 + 39.0 * share, 1e-9);
-    EXPECT_EQ(order.push_begins, share == 0.1);
+    EXPECT_EQ(order.push_begins, share == 1e-6);
   }
+  // It stays the softest until the trigger counts as released.
+  EXPECT_EQ(control.step(pulled(0.5 * (kPulled + PadControl::kTriggerRest))).push_n, 1.0);
   EXPECT_FALSE(control.step({}).push);
   EXPECT_EQ(control.step({}).push_n, 0.0);
 }

@@ -1,0 +1,162 @@
+// The cases of the window: made, opened, saved, and made anew when they are damaged.
+#include <QCoreApplication>
+#include <QFileDialog>
+#include <QFileInfo>
+#include <QStackedWidget>
+#include <QTimer>
+#include <utility>
+
+#include "viewer_client/desktop/main_window.hpp"
+#include "viewer_client/desktop/start_page.hpp"
+
+namespace osteon {
+
+void MainWindow::make_case(const QString& what, const QStringList& how, const std::filesystem::path& out,
+                           const QString& name, const std::filesystem::path& session) {
+  if (is_busy()) return;
+  start_->show_work(what);
+  pages_->setCurrentWidget(start_);
+  enable_opening(false);
+  maker_ = std::make_unique<CaseMaker>(
+      how, out,
+      CaseMaker::Events{[this](int percent) { start_->show_progress(percent); },
+                        [this, name, session](const std::filesystem::path& bone) {
+                          maker_.release()->deleteLater();
+                          enable_opening(true);
+                          start_->end_work({});
+                          practise(bone, session, name);
+                        },
+                        [this](const QString& sentence) {
+                          maker_.release()->deleteLater();
+                          enable_opening(true);
+                          start_->end_work(sentence.isEmpty() ? tr("Cancelled. Nothing was written.") : sentence);
+                        }});
+  maker_->start();
+}
+
+void MainWindow::open_example(const ExampleBone& bone) {
+  if (is_busy() || practice_) return;
+  const std::filesystem::path folder = example_folder(bone);
+  if (is_case(folder)) return practise(folder);
+  // A folder without its case.json is what is left of a case. The import would not write over it.
+  std::error_code ignored;
+  std::filesystem::remove_all(folder, ignored);
+  make_case(tr("%1 is made now. The next time it opens at once.").arg(bone.title), bone.how, folder);
+}
+
+bool MainWindow::is_busy() const { return maker_ || checker_; }
+
+void MainWindow::practice_failed(const QString& sentence) {
+  const bool joined = room_ && room_->joined();
+  if (joined || !opened_ || opened_->bone == made_anew_ || !can_be_made_again(opened_->bone))
+    return room_ended(sentence);
+  // The object that reports this is still at work, so it goes later.
+  QTimer::singleShot(0, this, [this, sentence, entry = *opened_] {
+    leave_room();
+    check_case(entry, sentence);
+  });
+}
+
+void MainWindow::check_case(const RecentEntry& entry, const QString& sentence) {
+  if (is_busy()) return;
+  start_->show_work(tr("Checking %1").arg(case_title(entry.bone)));
+  enable_opening(false);
+  const auto end = [this] {
+    checker_.release()->deleteLater();
+    enable_opening(true);
+  };
+  const QString log = text_of(cases_folder() / "check-") + QString::number(QCoreApplication::applicationPid()) + ".log";
+  checker_ =
+      std::make_unique<ImporterRun>(QStringList{"info", text_of(entry.bone)}, log,
+                                    ImporterRun::Events{[](int) {},
+                                                        [this, end, sentence](const QString&) {
+                                                          end();
+                                                          start_->end_work(sentence);
+                                                        },
+                                                        [this, end, entry, sentence](const QString& why) {
+                                                          const bool damaged = checker_->ran() && !why.isEmpty();
+                                                          end();
+                                                          damaged ? make_anew(entry) : start_->end_work(sentence);
+                                                        }});
+  checker_->start();
+}
+
+void MainWindow::make_anew(const RecentEntry& entry) {
+  const QString title = case_title(entry.bone);
+  std::error_code ignored;
+  std::filesystem::remove_all(entry.bone, ignored);
+  made_anew_ = entry.bone;
+  for (const ExampleBone& example : example_bones())
+    if (example_folder(example) == entry.bone)
+      return make_case(tr("%1 was damaged and is made anew.").arg(title), example.how, entry.bone, entry.name,
+                       entry.session);
+  start_->end_work(tr("The unpacked copy of %1 was damaged and is removed. Open the file again.")
+                       .arg(entry.name.isEmpty() ? title : entry.name));
+  start_->refresh();
+}
+
+void MainWindow::import_scan(const QString& source) {
+  if (is_busy()) return;
+  leave_room();
+  QString name = QFileInfo(source).completeBaseName();
+  if (name.isEmpty() || is_name_of_unpacked(name.toStdString())) name = "case";
+  std::filesystem::path out = data_folder() / "cases" / name.toStdString();
+  for (int n = 2; std::filesystem::exists(out); ++n)
+    out = data_folder() / "cases" / (name.toStdString() + "-" + std::to_string(n));
+  make_case(tr("Importing %1").arg(source), {"ct", source}, out);
+}
+
+void MainWindow::choose_scan() {
+  const QString folder = QFileDialog::getExistingDirectory(this, tr("The folder of a CT"));
+  if (!folder.isEmpty()) import_scan(folder);
+}
+
+void MainWindow::choose_case() {
+  // A file dialog chooses files only, so a folder is chosen by its case.json.
+  const QString chosen =
+      QFileDialog::getOpenFileName(this, tr("Open a case"), {}, tr("Cases (*.osteon case.json);;All files (*)"));
+  if (chosen.isEmpty()) return;
+  const std::filesystem::path path = chosen.toStdString();
+  if (path.filename() != "case.json") return open_case_file(path);
+  practise(path.parent_path());
+}
+
+void MainWindow::open_case_file(const std::filesystem::path& file) {
+  if (is_busy()) return;
+  leave_room();
+  const QString name = text_of(file.filename());
+  make_case(tr("Opening %1").arg(name), {"unpack", text_of(std::filesystem::absolute(file))}, {}, name);
+}
+
+void MainWindow::save_bone_as() {
+  if (!opened_) return;
+  // With a suffix of its own the dialog asks before it names a file that is there.
+  QFileDialog dialog(this, tr("Save the bone"), {}, tr("Cases (*.osteon)"));
+  dialog.setAcceptMode(QFileDialog::AcceptSave);
+  dialog.setDefaultSuffix("osteon");
+  dialog.selectFile(QFileInfo(case_title(opened_->bone)).fileName() + ".osteon");
+  if (dialog.exec() == QDialog::Accepted) save_case_file(dialog.selectedFiles().constFirst());
+}
+
+void MainWindow::save_case_file(const QString& file) {
+  if (!opened_) return;
+  if (saver_) return say(tr("Another bone is being saved. Try again when that is done."));
+  const QString log = text_of(cases_folder() / "pack-") + QString::number(QCoreApplication::applicationPid()) + ".log";
+  const auto end = [this](const QString& sentence) {
+    saver_.release()->deleteLater();
+    say(sentence);
+    if (std::exchange(closes_when_saved_, false)) close();
+  };
+  // The dialog has asked whether to write over a file that is there.
+  saver_ = std::make_unique<ImporterRun>(
+      QStringList{"pack", "--replace", text_of(opened_->bone), file}, log,
+      ImporterRun::Events{[this, file](int percent) { say(tr("Saving %1: %2 %").arg(file, QString::number(percent))); },
+                          [end, file](const QString&) { end(tr("Saved %1.").arg(file)); },
+                          [this, end](const QString& why) {
+                            closes_when_saved_ = false;  // the user is to read it, and to try again
+                            end(why);
+                          }});
+  saver_->start();
+}
+
+}  // namespace osteon
