@@ -12,6 +12,7 @@
 #include <type_traits>
 #include <utility>
 
+#include "common/mechanics/force_law.hpp"
 #include "haptic_client/device/hdf5_handle.hpp"
 #include "haptic_client/device/recording_layout.hpp"
 
@@ -256,7 +257,7 @@ struct RecordFile::Impl {
   Hdf5Handle start_hash, hash, room_seq, rows_dropped, finished;
   std::vector<Column<TickRow>> columns;  // the last is the time
   std::vector<Column<TakeUp>> take_ups;
-  std::vector<std::string> laws;  // each once
+  std::vector<std::string> laws;  // each once: those with which the tools began, then all others
   std::vector<std::uint8_t> law_of_tool;
   std::size_t waiting = 0;
   std::uint64_t rows = 0, seen = 0;
@@ -264,6 +265,7 @@ struct RecordFile::Impl {
   std::uint64_t keep_free_bytes = 0;
 
   Result<void> create();
+  [[nodiscard]] std::uint8_t law_of(const LoopReport& report) const;
   void make_columns();
   bool make_metadata();
   bool make_links();
@@ -291,6 +293,15 @@ tl::unexpected<Error> RecordFile::Impl::failed(const char* what) {
                              : why != 0 ? std::string(std::strerror(why))
                                         : "HDF5 gives no reason";
   return failure(ErrorCode::internal, "the recording " + path.string() + " cannot be " + what + ": " + reason);
+}
+
+std::uint8_t RecordFile::Impl::law_of(const LoopReport& report) const {
+  if (report.cutting.law != nullptr) {
+    const auto found = std::ranges::find(laws, report.cutting.law->name);
+    if (found != laws.end()) return static_cast<std::uint8_t>(found - laws.begin());
+  }
+  const auto tool = static_cast<std::size_t>(report.tool);
+  return tool < law_of_tool.size() ? law_of_tool[tool] : std::uint8_t{0};
 }
 
 void RecordFile::Impl::make_columns() {
@@ -370,10 +381,9 @@ void RecordFile::Impl::make_columns() {
   add(column<std::uint8_t, R>("data/tool", "1", "", "tool in hand: its index in metadata/tools",
                               [](const R& r) { return r.report.tool; }));
   add(column<std::uint8_t, R>("data/law", "1", "", "force law of the tool: its index in metadata/laws",
-                              [this](const R& r) {
-                                const auto tool = static_cast<std::size_t>(r.report.tool);
-                                return tool < law_of_tool.size() ? law_of_tool[tool] : std::uint8_t{0};
-                              }));
+                              [this](const R& r) { return law_of(r.report); }));
+  add(column<float, R>("data/wear", "1", "", "how blunt the tool is: 1 is sharp",
+                       [](const R& r) { return r.report.cutting.wear; }));
   add(column<std::uint8_t, R>("data/law_out_of_range", "1", "",
                               "bits: exceeded limits of the law, named in metadata/range_bits",
                               [](const R& r) { return r.report.cutting.out_of_range; }));
@@ -451,6 +461,9 @@ bool RecordFile::Impl::make_metadata() {
     if (law == laws.end()) law = laws.insert(law, tool.law);
     law_of_tool.push_back(static_cast<std::uint8_t>(law - laws.begin()));
   }
+  // A person may choose another law while the session runs, but no new text may appear while others read.
+  for (const ForceLaw& law : force_laws())
+    if (std::ranges::find(laws, law.name) == laws.end()) laws.emplace_back(law.name);
   const double voxel_mm3 = info.pitch_mm * info.pitch_mm * info.pitch_mm;
   const Hdf5Handle voxel = make_value(file.id(), "metadata/voxel_volume", H5T_NATIVE_DOUBLE, &voxel_mm3);
   const Hdf5Handle readme_type = text_type(std::strlen(kReadme));

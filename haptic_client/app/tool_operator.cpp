@@ -124,9 +124,9 @@ Result<std::unique_ptr<Session>> ToolOperator::pointed_on(const Case& bone, cons
   for (const ToolBox::Entry* entry : tools.entries()) known.push_back(entry->tool);
   Result<ReadyPlan> ready = make_pointed_hand(free_, bone, known);
   if (!ready) return failure(ready.error().code, "--tool " + options_.tool + ": " + ready.error().message);
-  std::vector<std::string> names;
-  for (const ToolModel& model : ready->tools) names.push_back(model.tool.name);
-  pointer_->set_tools(std::move(names));
+  std::vector<Tool> held;
+  for (const ToolModel& model : ready->tools) held.push_back(model.tool);
+  pointer_->set_tools(std::move(held));
   return std::make_unique<PointerSession>(std::move(*ready), pointer_->exchange(), simulated_, scaling);
 }
 
