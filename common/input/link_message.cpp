@@ -59,7 +59,14 @@ bool LinkMessage::boolean(const char* name) {
   return field->get<bool>();
 }
 
+std::optional<double> LinkMessage::optional_number(const char* name, double least, double most) {
+  if (find(name) == nullptr) return std::nullopt;
+  return number(name, least, most);
+}
+
 bool LinkMessage::optional_boolean(const char* name) { return find(name) != nullptr && boolean(name); }
+
+std::string LinkMessage::optional_text(const char* name) { return find(name) == nullptr ? std::string() : text(name); }
 
 std::string LinkMessage::text(const char* name) {
   const json* field = find(name);

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <memory>
 #include <nlohmann/json_fwd.hpp>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -16,7 +17,8 @@
 namespace osteon {
 
 inline constexpr int kLinkVersion = 3;
-// Bytes. Two texts of control characters, of six bytes each in JSON, a wave and all numbers fit into a message.
+// Bytes. Of control characters, of six bytes each in JSON, two texts with a wave, or three, fit into a message beside
+// all numbers.
 inline constexpr std::size_t kMostLinkText = 512;
 
 // What errors call the message and its two programs: "a pointer's", "the pointer", "osteon and osteon-haptic".
@@ -38,8 +40,11 @@ class LinkMessage {
 
   double number(const char* name, double least, double most);
   bool boolean(const char* name);
-  bool optional_boolean(const char* name);  // of a field that older programs do not send; false without it
   std::string text(const char* name);
+  // Of fields that older programs do not send: none, false or empty without the field.
+  std::optional<double> optional_number(const char* name, double least, double most);
+  bool optional_boolean(const char* name);
+  std::string optional_text(const char* name);
   // The index of a text that is one of these.
   std::size_t choice(const char* name, std::span<const std::string_view> choices);
   Vec3 vector(const char* name, double most);  // each coordinate from -most to most

@@ -15,44 +15,49 @@ constexpr LinkMessageNames kPointerMessage{"a pointer's", "the pointer", "osteon
 
 json numbers(const Vec3& v) { return json::array({v.x(), v.y(), v.z()}); }
 json numbers(const Eigen::Quaterniond& q) { return json::array({q.w(), q.x(), q.y(), q.z()}); }
+std::string text_of(const json& message) { return message.dump(-1, ' ', false, json::error_handler_t::replace); }
 
 }  // namespace
 
 LocalLinkNames pointer_link_names() { return {"the pointer's socket", "a haptic client"}; }
 
 std::string encode(const PointerInput& input) {
-  return json{{"version", kLinkVersion},
-              {"target_mm", numbers(input.target_mm)},
-              {"rotation", numbers(input.rotation_bone_tool)},
-              {"on_bone", input.on_bone},
-              {"push", input.push},
-              {"irrigation", input.irrigation},
-              {"suction", input.suction},
-              {"push_n", input.push_n},
-              {"fine", input.fine},
-              {"spindle", input.spindle},
-              {"spindle_rpm", input.spindle_rpm},
-              {"tool", shortened(input.tool)},
-              {"empty_hand", input.empty_hand},
-              {"source", name_of(input.source)}}
-      .dump(-1, ' ', false, json::error_handler_t::replace);
+  json message{{"version", kLinkVersion},
+               {"target_mm", numbers(input.target_mm)},
+               {"rotation", numbers(input.rotation_bone_tool)},
+               {"on_bone", input.on_bone},
+               {"push", input.push},
+               {"irrigation", input.irrigation},
+               {"suction", input.suction},
+               {"push_n", input.push_n},
+               {"fine", input.fine},
+               {"spindle", input.spindle},
+               {"spindle_rpm", input.spindle_rpm},
+               {"tool", shortened(input.tool)},
+               {"empty_hand", input.empty_hand},
+               {"law", shortened(input.law)},
+               {"source", name_of(input.source)}};
+  if (input.wear) message["wear"] = *input.wear;
+  return text_of(message);
 }
 
 std::string encode(const PointerOutput& output) {
-  return json{{"version", kLinkVersion},
-              {"position_mm", numbers(output.pose_bone_tool.position_mm)},
-              {"rotation", numbers(output.pose_bone_tool.rotation)},
-              {"force_hand_n", numbers(output.force_hand_n)},
-              {"force_bone_n", numbers(output.force_bone_n)},
-              {"device_holds_n", output.device_holds_n},
-              {"push_n", output.push_n},
-              {"depth_mm", output.depth_mm},
-              {"pushing", output.pushing},
-              {"on_metal", output.on_metal},
-              {"saturated", output.saturated},
-              {"tool", shortened(output.tool)},
-              {"trouble", shortened(output.trouble)}}
-      .dump(-1, ' ', false, json::error_handler_t::replace);
+  json message{{"version", kLinkVersion},
+               {"position_mm", numbers(output.pose_bone_tool.position_mm)},
+               {"rotation", numbers(output.pose_bone_tool.rotation)},
+               {"force_hand_n", numbers(output.force_hand_n)},
+               {"force_bone_n", numbers(output.force_bone_n)},
+               {"device_holds_n", output.device_holds_n},
+               {"push_n", output.push_n},
+               {"depth_mm", output.depth_mm},
+               {"pushing", output.pushing},
+               {"on_metal", output.on_metal},
+               {"saturated", output.saturated},
+               {"tool", shortened(output.tool)},
+               {"law", shortened(output.law)},
+               {"trouble", shortened(output.trouble)}};
+  if (output.wear) message["wear"] = *output.wear;
+  return text_of(message);
 }
 
 Result<PointerInput> read_pointer_input(std::string_view text) {
@@ -71,6 +76,8 @@ Result<PointerInput> read_pointer_input(std::string_view text) {
   input.spindle_rpm = fields->number("spindle_rpm", 0.0, kMostRpm);
   input.tool = fields->text("tool");
   input.empty_hand = fields->optional_boolean("empty_hand");
+  input.wear = fields->optional_number("wear", kSharp, kBluntest);
+  input.law = fields->optional_text("law");
   input.source = static_cast<PointerSource>(fields->choice("source", kPointerSources));
   if (const Result<void> read = fields->outcome(); !read) return tl::unexpected(read.error());
   return input;
@@ -91,6 +98,8 @@ Result<PointerOutput> read_pointer_output(std::string_view text) {
   output.on_metal = fields->boolean("on_metal");
   output.saturated = fields->boolean("saturated");
   output.tool = fields->text("tool");
+  output.wear = fields->optional_number("wear", kSharp, kBluntest);
+  output.law = fields->optional_text("law");
   output.trouble = fields->text("trouble");
   if (const Result<void> read = fields->outcome(); !read) return tl::unexpected(read.error());
   return output;

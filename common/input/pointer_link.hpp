@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -17,6 +18,7 @@ namespace osteon {
 // A window that sends nothing for so long counts as hung. The hand then stops, and pushes only after a new press.
 inline constexpr std::chrono::milliseconds kPointerSilence{1000};
 inline constexpr double kLeastPush_n = 1.0, kMostPush_n = 40.0;
+inline constexpr double kSharp = 1.0, kBluntest = 5.0;  // of wear
 
 // What leads the pointer.
 enum class PointerSource : std::uint8_t { mouse, pen, game_pad };
@@ -39,6 +41,10 @@ struct PointerInput {
   double spindle_rpm = 0.0;  // its full speed; 0: the tool's own
   std::string tool{};        // that the hand is to hold; empty: no change
   bool empty_hand = false;   // the hand holds no tool, and nobody sees one; off in a message without this field
+  // How blunt that tool is made, kSharp to kBluntest. It acts when it changes, and cutting blunts the tool further.
+  // None, as in a message without this field: the tool stays as it is.
+  std::optional<double> wear{};
+  std::string law{};  // the force law of that tool; empty, or without this field: the one it began with
   PointerSource source = PointerSource::mouse;
   friend bool operator==(const PointerInput&, const PointerInput&) = default;
 };
@@ -47,14 +53,16 @@ struct PointerInput {
 struct PointerOutput {
   Pose pose_bone_tool;
   Vec3 force_hand_n = Vec3::Zero(), force_bone_n = Vec3::Zero();  // what the hand gets, what the bone gives
-  double device_holds_n = 0;  // the largest force that the device holds for long; 0: not known
-  double push_n = 0;          // with which the hand pushes now
-  double depth_mm = 0;        // of the tip along its axis since the push began
-  bool pushing = false;       // false while the button is held: the hand has reacted to a breakthrough
-  bool on_metal = false;      // metal is in the way of the turning tool
-  bool saturated = false;     // the device cannot hold what it should show
-  std::string tool{};         // in the hand
-  std::string trouble{};      // one sentence, such as why a tool cannot be held; empty: none
+  double device_holds_n = 0;     // the largest force that the device holds for long; 0: not known
+  double push_n = 0;             // with which the hand pushes now
+  double depth_mm = 0;           // of the tip along its axis since the push began
+  bool pushing = false;          // false while the button is held: the hand has reacted to a breakthrough
+  bool on_metal = false;         // metal is in the way of the turning tool
+  bool saturated = false;        // the device cannot hold what it should show
+  std::string tool{};            // in the hand
+  std::optional<double> wear{};  // of that tool, kSharp to kBluntest; none: an older client does not say
+  std::string law{};             // by which that tool resists; empty: an older client does not say
+  std::string trouble{};         // one sentence, such as why a tool cannot be held; empty: none
 };
 
 // As text, and back. A text of more than 512 bytes is shortened. Errors of reading, invalid_input: another version; a

@@ -161,6 +161,8 @@ class CuttingEffects {
 
   // For LawInputs::wear.
   [[nodiscard]] double wear() const noexcept { return bluntness_.wear(); }
+  // From now on the tool is as blunt as that. Cutting blunts it further.
+  void set_wear(double wear) noexcept { bluntness_ = Bluntness(wear); }
   // The law after clogging, binding and blows.
   [[nodiscard]] FeedLaw felt(const FeedLaw& law) const noexcept;
   [[nodiscard]] double torque_nmm(double law_torque_nmm) const noexcept;

@@ -33,8 +33,8 @@ PointerFeed::~PointerFeed() {
   thread_.join();
 }
 
-void PointerFeed::set_tools(std::vector<std::string> names) {
-  tools_ = std::move(names);
+void PointerFeed::set_tools(std::vector<Tool> tools) {
+  tools_ = std::move(tools);
   ready_.store(true, std::memory_order_release);
 }
 
@@ -65,13 +65,33 @@ void PointerFeed::run() {
   }
 }
 
+void PointerFeed::choose(const PointerInput& input) {
+  trouble_.clear();
+  int tool = tool_;
+  if (!input.tool.empty()) {
+    const auto found = std::ranges::find(tools_, input.tool, &Tool::name);
+    if (found == tools_.end()) {
+      trouble_ = "the tool \"" + input.tool + "\" cannot be held; choose one that cuts";
+      return;
+    }
+    tool = static_cast<int>(found - tools_.begin());
+  }
+  const ForceLaw* law = nullptr;
+  if (!input.law.empty()) {
+    const Result<const ForceLaw*> fits = choose_law(tools_[static_cast<std::size_t>(tool)], input.law);
+    if (!fits) {
+      trouble_ = fits.error().message;
+      return;
+    }
+    law = *fits;
+  }
+  tool_ = tool;
+  law_ = law;
+}
+
 void PointerFeed::command(const PointerInput& input) {
   if (!ready_.load(std::memory_order_acquire)) return;
-  if (!input.tool.empty()) {
-    const auto found = std::ranges::find(tools_, input.tool);
-    trouble_ = found == tools_.end() ? "the tool \"" + input.tool + "\" cannot be held; choose one that cuts" : "";
-    if (found != tools_.end()) tool_ = static_cast<int>(found - tools_.begin());
-  }
+  choose(input);
   if (input.push && pushes_ != input.source) {
     pushes_ = input.source;
     pushed_ |= 1U << static_cast<unsigned>(input.source);
@@ -91,7 +111,10 @@ void PointerFeed::command(const PointerInput& input) {
              .irrigation = input.irrigation,
              .suction = input.suction,
              .empty_hand = input.empty_hand,
-             .source = input.source};
+             .source = input.source,
+             // A wear is of the tool that the message names.
+             .wear = trouble_.empty() ? input.wear.value_or(0.0) : 0.0,
+             .law = law_};
   exchange_.commands.publish();
 }
 
@@ -107,7 +130,9 @@ void PointerFeed::report() {
                  .pushing = state.pushing,
                  .on_metal = state.on_metal,
                  .saturated = state.saturated,
-                 .tool = tools_[static_cast<std::size_t>(state.tool)],
+                 .tool = tools_[static_cast<std::size_t>(state.tool)].name,
+                 .wear = state.wear,
+                 .law = state.law ? std::string(state.law->name) : std::string(),
                  .trouble = trouble_});
 }
 

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "common/input/pointer_link.hpp"
+#include "common/tools/tool.hpp"
 #include "haptic_client/device/connection.hpp"
 #include "haptic_client/simulation/pointer_session.hpp"
 
@@ -25,7 +26,7 @@ class PointerFeed {
 
   [[nodiscard]] PointerExchange& exchange() { return exchange_; }
   // The tools of the session, by their index. Call this before the session's first tick.
-  void set_tools(std::vector<std::string> names);
+  void set_tools(std::vector<Tool> tools);
   [[nodiscard]] int losses() const { return losses_; }
   // What has pushed by now: "mouse", "pen", "game pad".
   [[nodiscard]] std::vector<std::string_view> pushed() const;
@@ -34,6 +35,8 @@ class PointerFeed {
   PointerFeed(std::filesystem::path socket, std::unique_ptr<PointerClient> client, DeviceNotice notice);
   void run();
   void command(const PointerInput& input);
+  // Finds the tool and its law. What is not there, or does not fit, leaves both as they were, and becomes the trouble.
+  void choose(const PointerInput& input);
   void report();
 
   const std::filesystem::path socket_;
@@ -41,9 +44,10 @@ class PointerFeed {
   const DeviceNotice notice_;
   PointerExchange exchange_;
   std::atomic<bool> stop_ = false, ready_ = false;
-  std::vector<std::string> tools_;       // fixed once ready_
+  std::vector<Tool> tools_;              // fixed once ready_
   std::uint64_t number_ = 0;             // thread
   int tool_ = 0;                         // thread; as commanded last
+  const ForceLaw* law_ = nullptr;        // thread; of that tool, as commanded last; null: its own
   std::string trouble_;                  // thread
   std::optional<PointerSource> pushes_;  // thread; at the last push
   std::atomic<unsigned> pushed_ = 0;     // a bit for each source

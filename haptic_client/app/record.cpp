@@ -48,10 +48,11 @@ std::string MetalWatch::note(const ToolModel& model, const LoopReport& report) {
 
 std::string RangeWatch::note(const ToolModel& model, const LoopReport& report) {
   if (report.cutting.out_of_range == 0) return {};
-  const auto found = std::ranges::find(uses_, model.law, &Use::law);
+  const ForceLaw* law = report.cutting.law ? report.cutting.law : model.law;
+  const auto found = std::ranges::find(uses_, law, &Use::law);
   const auto at = static_cast<std::size_t>(found - uses_.begin());
   if (found == uses_.end()) {
-    uses_.push_back({model.law, 0, 0});
+    uses_.push_back({law, 0, 0});
     stays_.push_back({report.state_seq - 1});
   }
   uses_[at].bits |= report.cutting.out_of_range;
@@ -62,7 +63,7 @@ std::string RangeWatch::note(const ToolModel& model, const LoopReport& report) {
   stay.last_seq = report.state_seq;
   if (stay.reported || stay.ticks < kLasting_ticks) return {};
   stay.reported = true;
-  return out_of_range_sentence(*model.law, report.cutting.out_of_range);
+  return out_of_range_sentence(*law, report.cutting.out_of_range);
 }
 
 Result<void> SessionLog::open(const std::filesystem::path& file, const DeviceInfo& device) {

@@ -38,7 +38,7 @@ struct RecordedCut {
 };
 
 [[nodiscard]] const char* name(CuttingPhase phase);
-// Name of the law by which a tool cuts.
+// Name of the law by which a tool cuts, as it began.
 [[nodiscard]] std::string law_name(const ToolModel& model);
 // Names of the bits of LoopReport::events, the lowest first.
 [[nodiscard]] std::vector<std::string> event_names();
@@ -67,8 +67,8 @@ class RangeWatch {
     unsigned bits = 0;        // of OutOfRange, all that occurred
     std::uint64_t ticks = 0;  // number of ticks outside
   };
-  // Call for every tick that was outside, in order; other ticks are permitted. Returns a sentence when a law stays
-  // outside for the first time in the session, else nothing.
+  // Call for every tick that was outside, in order; other ticks are permitted. The law is the report's, or the model's
+  // if it names none. Returns a sentence when a law stays outside for the first time in the session, else nothing.
   [[nodiscard]] std::string note(const ToolModel& model, const LoopReport& report);
   [[nodiscard]] const std::vector<Use>& uses() const { return uses_; }  // each law once
 

@@ -13,6 +13,7 @@
 #include <utility>
 
 #include "common/input/pointer_link.hpp"
+#include "common/mechanics/force_law.hpp"
 #include "haptic_client/device/hdf5_handle.hpp"
 #include "haptic_client/device/recording_layout.hpp"
 
@@ -257,7 +258,7 @@ struct RecordFile::Impl {
   Hdf5Handle start_hash, hash, room_seq, rows_dropped, finished;
   std::vector<Column<TickRow>> columns;  // the last is the time
   std::vector<Column<TakeUp>> take_ups;
-  std::vector<std::string> laws;  // each once
+  std::vector<std::string> laws;  // each once: those with which the tools began, then all others
   std::vector<std::uint8_t> law_of_tool;
   std::size_t waiting = 0;
   std::uint64_t rows = 0, seen = 0;
@@ -265,6 +266,7 @@ struct RecordFile::Impl {
   std::uint64_t keep_free_bytes = 0;
 
   Result<void> create();
+  [[nodiscard]] std::uint8_t law_of(const LoopReport& report) const;
   void make_columns();
   bool make_metadata();
   bool make_links();
@@ -292,6 +294,15 @@ tl::unexpected<Error> RecordFile::Impl::failed(const char* what) {
                              : why != 0 ? std::string(std::strerror(why))
                                         : "HDF5 gives no reason";
   return failure(ErrorCode::internal, "the recording " + path.string() + " cannot be " + what + ": " + reason);
+}
+
+std::uint8_t RecordFile::Impl::law_of(const LoopReport& report) const {
+  if (report.cutting.law != nullptr) {
+    const auto found = std::ranges::find(laws, report.cutting.law->name);
+    if (found != laws.end()) return static_cast<std::uint8_t>(found - laws.begin());
+  }
+  const auto tool = static_cast<std::size_t>(report.tool);
+  return tool < law_of_tool.size() ? law_of_tool[tool] : std::uint8_t{0};
 }
 
 void RecordFile::Impl::make_columns() {
@@ -370,11 +381,10 @@ void RecordFile::Impl::make_columns() {
   add(column<std::uint32_t, R>("data/step", "1", "", "of the plan, from 0", [](const R& r) { return r.step; }));
   add(column<std::uint8_t, R>("data/tool", "1", "", "tool in hand: its index in metadata/tools",
                               [](const R& r) { return r.report.tool; }));
-  add(column<std::uint8_t, R>("data/law", "1", "", "force law of the tool: its index in metadata/laws",
-                              [this](const R& r) {
-                                const auto tool = static_cast<std::size_t>(r.report.tool);
-                                return tool < law_of_tool.size() ? law_of_tool[tool] : std::uint8_t{0};
-                              }));
+  add(column<std::uint8_t, R>(recording::kLaw, "1", "", "force law of the tool: its index in metadata/laws",
+                              [this](const R& r) { return law_of(r.report); }));
+  add(column<double, R>(recording::kWear, "1", "", "how blunt the tool was before the tick: 1 is sharp",
+                        [](const R& r) { return r.report.cutting.wear; }));
   add(column<std::uint8_t, R>("data/law_out_of_range", "1", "",
                               "bits: exceeded limits of the law, named in metadata/range_bits",
                               [](const R& r) { return r.report.cutting.out_of_range; }));
@@ -458,12 +468,15 @@ bool RecordFile::Impl::make_metadata() {
     if (law == laws.end()) law = laws.insert(law, tool.law);
     law_of_tool.push_back(static_cast<std::uint8_t>(law - laws.begin()));
   }
+  // A person may choose another law while the session runs, but no new text may appear while others read.
+  for (const ForceLaw& law : force_laws())
+    if (std::ranges::find(laws, law.name) == laws.end()) laws.emplace_back(law.name);
   const double voxel_mm3 = info.pitch_mm * info.pitch_mm * info.pitch_mm;
   const Hdf5Handle voxel = make_value(file.id(), "metadata/voxel_volume", H5T_NATIVE_DOUBLE, &voxel_mm3);
   const Hdf5Handle readme_type = text_type(std::strlen(kReadme));
   const Hdf5Handle readme = make_value(file.id(), "metadata/README", readme_type.id(), kReadme);
   ok = ok && voxel.ok() && readme.ok() && set_text(voxel.id(), "units", "mm3") &&
-       make_texts(file.id(), recording::kTools, tools) && make_texts(file.id(), "metadata/laws", laws) &&
+       make_texts(file.id(), recording::kTools, tools) && make_texts(file.id(), recording::kLaws, laws) &&
        make_texts(file.id(), "metadata/event_bits", event_names()) &&
        make_texts(file.id(), "metadata/range_bits", range_names());
   // Values known only later. They exist from the start, because no new objects may appear while others read.

@@ -136,9 +136,9 @@ Result<std::unique_ptr<Session>> ToolOperator::pointed_on(const Case& bone, cons
                                                           const ForceScaling& scaling) {
   Result<ReadyPlan> ready = pointed_ready_on(bone, tools);
   if (!ready) return tl::unexpected(ready.error());
-  std::vector<std::string> names;
-  for (const ToolModel& model : ready->tools) names.push_back(model.tool.name);
-  pointer_->set_tools(std::move(names));
+  std::vector<Tool> held;
+  for (const ToolModel& model : ready->tools) held.push_back(model.tool);
+  pointer_->set_tools(std::move(held));
   return std::make_unique<PointerSession>(std::move(*ready), pointer_->exchange(), simulated_, scaling);
 }
 

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <optional>
 
+#include "common/input/pointer_link.hpp"
 #include "haptic_client/device/hdf5_handle.hpp"
 #include "haptic_client/device/recording_layout.hpp"
 
@@ -311,12 +312,18 @@ void read_pointer(Reader& reader, RecordedSession& session) {
   const auto rpm = reader.values<double>(recording::kCommandedRpm, H5T_NATIVE_DOUBLE, rows, 1);
   const auto phase = reader.values<std::uint8_t>(recording::kPhase, H5T_NATIVE_UINT8, rows, 1);
   const auto source = reader.values<std::uint8_t>(recording::kPointerSource, H5T_NATIVE_UINT8, rows, 1);
+  const auto law = reader.values<std::uint8_t>(recording::kLaw, H5T_NATIVE_UINT8, rows, 1);
+  const auto wear = reader.values<double>(recording::kWear, H5T_NATIVE_DOUBLE, rows, 1);
+  session.laws = reader.texts(recording::kLaws);
   if (!reader.ok()) return;
   const auto in_hand = reader.enumerator(recording::kPhase, "free_hand");
   for (std::size_t i = 0; i < rows && reader.ok(); ++i) {
     if (!(rpm[i] >= 0.0 && rpm[i] <= kMostRpm)) reader.damaged(recording::kCommandedRpm);
     if (session.tools.empty()) reader.damaged(recording::kTools);
-    session.pointer.push_back({.commanded_rpm = rpm[i], .in_hand = phase[i] == in_hand, .source = source[i]});
+    if (law[i] >= session.laws.size()) reader.damaged(recording::kLaw);
+    if (!(wear[i] >= kSharp && wear[i] <= kBluntest)) reader.damaged(recording::kWear);
+    session.pointer.push_back(
+        {.commanded_rpm = rpm[i], .in_hand = phase[i] == in_hand, .source = source[i], .law = law[i], .wear = wear[i]});
   }
   read_take_ups(reader, session);
 }

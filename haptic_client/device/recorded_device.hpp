@@ -17,6 +17,8 @@ struct PointerTick {
   bool in_hand = false;  // a tool was taken up
   int take_up = -1;      // index in RecordedSession::take_ups; -1: none in this tick
   std::uint8_t source = 0;
+  std::uint8_t law = 0;  // of the tool in hand: index in RecordedSession::laws
+  double wear = 1.0;     // of that tool
 };
 
 // A tool was taken up: which one, where, and the parameters of the mapping from the device to the bone from then on.
@@ -34,6 +36,7 @@ struct RecordedSession {
   std::string case_hash, case_title;  // of the bone; the hash in hexadecimal digits
   std::string plan_digest;            // of the plan and its tools, likewise; empty: the recording does not say
   std::vector<std::string> tools;     // names, by their index in the session
+  std::vector<std::string> laws;      // names; of a pointer's recording only
   std::string start_hash;             // of the bone at the beginning; empty: the recording does not say
   std::string field_hash;             // of the bone at the end; empty: the recording has no end
   double force_scale = 0;             // s

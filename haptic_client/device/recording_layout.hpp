@@ -28,6 +28,8 @@ inline constexpr const char* kDeviceStatus = "data/device_status";
 inline constexpr const char* kCalibration = "data/calibration";
 inline constexpr const char* kCommandedRpm = "data/commanded_rpm";
 inline constexpr const char* kPhase = "data/phase";
+inline constexpr const char* kLaw = "data/law";
+inline constexpr const char* kWear = "data/wear";
 // What leads a pointer's hand: 0 no pointer, then the PointerSources. In older recordings it is missing, and so is the
 // bit of data/buttons that says when the hand cuts.
 inline constexpr const char* kPointerSource = "data/pointer_source";
@@ -65,6 +67,7 @@ inline constexpr const char* kForceAxes = "device_force_axes";
 inline constexpr const char* kTorqueAxes = "device_torque_axes";
 // Names of the session's tools, by their index in it.
 inline constexpr const char* kTools = "metadata/tools";
+inline constexpr const char* kLaws = "metadata/laws";
 // Set when the room was joined; older recordings have none.
 inline constexpr const char* kStartHash = "metadata/field_hash_at_start";
 // Set at the end.

@@ -76,6 +76,13 @@ void HapticLoop::take_up(int tool, const Pose& pose_rest_tool, const WorkspaceMa
   placed_ = true;
 }
 
+void HapticLoop::set_wear(int tool, double wear) noexcept {
+  tools_[static_cast<std::size_t>(tool)].wear = wear;  // without effects the model's counts
+  effects_[static_cast<std::size_t>(tool)].set_wear(wear);
+}
+
+void HapticLoop::set_law(int tool, const ForceLaw& law) noexcept { tools_[static_cast<std::size_t>(tool)].law = &law; }
+
 void HapticLoop::see_bone(const Pose& pose_rest_bone) noexcept {
   bone_ = pose_rest_bone;
   moved_ = pose_rest_bone.position_mm != Vec3::Zero() || pose_rest_bone.rotation.vec() != Vec3::Zero();
@@ -226,6 +233,8 @@ LoopReport HapticLoop::tick(const LoopInput& input, const Patch& patch, std::spa
   report.coupling.force_n = coupling.spring_n;
   report.coupling.offset_mm = coupling_.offset_mm();
   torque_nmm_ = load_nmm(step, moment.touching ? coupling.spring_n.norm() : 0.0);
+  report.cutting.wear = params_.tool_effects ? effects_[static_cast<std::size_t>(tool_)].wear() : model.wear;
+  report.cutting.law = model.law;
   wear_and_clog(model, step, moment.touching ? coupling.spring_n : Vec3(Vec3::Zero()), input.irrigation);
   report.cutting.flutes_full = effects_[static_cast<std::size_t>(tool_)].clogging().level();
   if (moment.touching) report.coupling.torque_nmm = step.contact_torque_nmm;

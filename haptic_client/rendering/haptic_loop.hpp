@@ -120,9 +120,11 @@ struct LoopReport {
     double work_mj = 0;           // of that force over the path cut in this tick
     double pushed_back_mj = 0;    // work of a cut's force that rotation undid in the same tick; not shown
     double feed_mm_per_s = 0, density_g_cm3 = 0, engaged = 0, torque_nmm = 0;
-    double flutes_full = 0;     // share of the flutes that chips fill, after the tick
-    double across_n = 0;        // across the feed; the hand feels it through the motor port
-    unsigned out_of_range = 0;  // bits of OutOfRange: where the law is used outside its range
+    double flutes_full = 0;         // share of the flutes that chips fill, after the tick
+    double wear = 1.0;              // of the tool, before the tick
+    const ForceLaw* law = nullptr;  // of the tool; null: there is none
+    double across_n = 0;            // across the feed; the hand feels it through the motor port
+    unsigned out_of_range = 0;      // bits of OutOfRange: where the law is used outside its range
   } cutting;
 
   // The spring between handle and proxy: passive, in the energy ledger.
@@ -186,11 +188,17 @@ class HapticLoop {
   // [haptic] Poses of others' tools; must stay valid through the next tick. The person who guides this hand or holds
   // its tool is not felt.
   void see_partners(std::span<const PartnerTool> partners) noexcept { partners_ = partners; }
+  // [haptic] How blunt a tool is, and the law by which it resists, from the next tick on. The law must fit the tool.
+  // Only the resistance to the next feed changes. The spring keeps its extension, so its force does not jump, and the
+  // ledger pays for each cut as before. The motor's force stays within the bound of its port.
+  void set_wear(int tool, double wear) noexcept;
+  void set_law(int tool, const ForceLaw& law) noexcept;
   // [haptic] `patch`: the newest one; `guides`: those on the bone.
   LoopReport tick(const LoopInput& input, const Patch& patch, std::span<const PlacedGuide> guides = {}) noexcept;
 
   // [replica] Closed cuts in order.
   [[nodiscard]] bool take_piece(CutPiece& piece) noexcept { return pieces_.try_pop(piece); }
+  // Any thread, but wear and law of the model are for the haptic thread alone.
   [[nodiscard]] const ToolModel& tool(int index) const { return tools_[static_cast<std::size_t>(index)]; }
   [[nodiscard]] const LoopParams& params() const { return params_; }
   // [haptic]
@@ -236,7 +244,7 @@ class HapticLoop {
   static constexpr int kQuietTicks = 20;  // a path ends when the tool has been off the bone for so long
 
   LoopParams params_;
-  std::vector<ToolModel> tools_;
+  std::vector<ToolModel> tools_;         // set_wear() and set_law() change them
   std::vector<CuttingEffects> effects_;  // of each tool
   SpscQueue<CutPiece, 64> pieces_;
   WorkspaceMapping mapping_;

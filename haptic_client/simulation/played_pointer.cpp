@@ -14,16 +14,24 @@ PlayedPointerSession::PlayedPointerSession(ReadyPlan plan, RecordedDevice& devic
   const Pose start = pointer_start(plan_);
   WorkspaceMapping mapping;
   mapping.align(Eigen::Quaterniond::Identity(), 1.0, start.position_mm, start.position_mm);
-  loop_.take_up(0, start, mapping);
+  loop_.take_up(tool_, start, mapping);
+  for (const std::string& name : device.session().laws) laws_.push_back(find_force_law(name));
 }
 
 void PlayedPointerSession::take_up(const RecordedTakeUp& taken, SurgeonOrder& order) noexcept {
   WorkspaceMapping mapping;
   mapping.align(taken.view, taken.scale, taken.device_mm, taken.bone_mm);
-  loop_.take_up(taken.tool, taken.pose_bone_tool, mapping);
+  tool_ = taken.tool;
+  loop_.take_up(tool_, taken.pose_bone_tool, mapping);
   order.hand.target_mm = taken.pose_bone_tool.position_mm;
   order.rotation = taken.pose_bone_tool.rotation;
   order.take_up = true;
+}
+
+// The person may have changed both in any tick. Cutting blunts the tool again as it did, so this is no change then.
+void PlayedPointerSession::take_edge(const PointerTick& now) noexcept {
+  loop_.set_wear(tool_, now.wear);
+  if (const ForceLaw* law = laws_[now.law]) loop_.set_law(tool_, *law);
 }
 
 SessionTick PlayedPointerSession::tick(const Patch& patch, RoomLink room, int periods,
@@ -34,6 +42,7 @@ SessionTick PlayedPointerSession::tick(const Patch& patch, RoomLink room, int pe
   const PointerTick* now = device_.pointer_tick();
   if (now && now->take_up >= 0)
     take_up(device_.session().take_ups[static_cast<std::size_t>(now->take_up)], result.order);
+  if (now) take_edge(*now);
   const bool in_hand = now && now->in_hand;
   LoopInput input;
   input.pose_device_tool = reading.pose_device_tool;

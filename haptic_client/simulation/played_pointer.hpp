@@ -30,10 +30,13 @@ class PlayedPointerSession final : public Session {
 
  private:
   void take_up(const RecordedTakeUp& taken, SurgeonOrder& order) noexcept;
+  void take_edge(const PointerTick& now) noexcept;  // wear and law of the tool in hand
 
   ReadyPlan plan_;
   RecordedDevice& device_;
   HapticLoop loop_;
+  std::vector<const ForceLaw*> laws_;  // as the recording numbers them; null: there is no law of that name
+  int tool_ = 0;                       // in hand
   std::vector<StepResult> results_{1};
   std::vector<LeftItem> left_;
 };

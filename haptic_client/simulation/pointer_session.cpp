@@ -69,7 +69,8 @@ PointerSession::PointerSession(ReadyPlan plan, PointerExchange& exchange, const 
     : plan_(std::move(plan)),
       exchange_(exchange),
       device_(device),
-      loop_(pointer_loop(device.limits, scaling, dt_s), plan_.tools) {
+      loop_(pointer_loop(device.limits, scaling, dt_s), plan_.tools),
+      worn_(plan_.tools.size()) {
   near_.make_room(kMostContactPoints);
   // Until the pointer first meets the bone, the tool waits above it, as a free hand's does. Others see it there.
   const Pose start = pointer_start(plan_);
@@ -92,6 +93,17 @@ void PointerSession::read_pointer() noexcept {
   ticks_since_message_ = command_.number != before ? 0 : std::min(ticks_since_message_ + 1, kSilentTicks + 1);
   command_.tool = std::clamp(command_.tool, 0, static_cast<int>(plan_.tools.size()) - 1);
   if (!command_.push) let_go_ = true;
+  take_edge();
+}
+
+void PointerSession::take_edge() noexcept {
+  const auto tool = static_cast<std::size_t>(command_.tool);
+  // The window repeats its message. A tool must not be sharpened by that.
+  if (command_.wear > 0.0 && command_.wear != worn_[tool]) {
+    loop_.set_wear(command_.tool, command_.wear);
+    worn_[tool] = command_.wear;
+  }
+  loop_.set_law(command_.tool, command_.law ? *command_.law : *plan_.tools[tool].law);
 }
 
 Vec3 PointerSession::lifted(double height_mm) const noexcept { return command_.target_mm - height_mm * axis(); }
@@ -316,6 +328,8 @@ SessionTick PointerSession::tick(const Patch& patch, RoomLink room, int periods,
   // The device shows its peak for moments only. An instructor's lower limit is not the device's fault.
   state.saturated = last_.device.force_n.norm() > 0.999 * state.device_holds_n;
   state.tool = last_.tool;
+  state.wear = last_.cutting.wear;
+  state.law = last_.cutting.law;
   exchange_.states.publish();
   return result;
 }

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "common/input/pointer_link.hpp"
 #include "common/runtime/triple_buffer.hpp"
@@ -24,6 +25,9 @@ struct PointerCommand {
   bool irrigation = false, suction = false;
   bool empty_hand = true;  // until a message says that it holds something
   PointerSource source = PointerSource::mouse;
+  // Of that tool. A wear acts when it changes; 0: the tool stays as it is.
+  double wear = 0.0;
+  const ForceLaw* law = nullptr;  // it fits the tool; null: the one that the tool began with
 };
 
 // What the hand and the tool do; bone frame.
@@ -34,6 +38,8 @@ struct PointerState {
   double device_holds_n = 0;  // the largest force that the device holds for long
   bool pushing = false, on_metal = false, saturated = false;
   int tool = 0;
+  double wear = kSharp;           // of that tool
+  const ForceLaw* law = nullptr;  // of that tool
 };
 
 // Between the thread that reads the pointer and the haptic thread.
@@ -86,6 +92,7 @@ class PointerSession final : public Session {
  private:
   [[nodiscard]] bool silent() const noexcept { return ticks_since_message_ > kSilentTicks; }
   void read_pointer() noexcept;
+  void take_edge() noexcept;  // wear and law of the tool that the pointer wants
   void act(const Patch& patch, double dt_s, SurgeonOrder& order) noexcept;
   void take_up(SurgeonOrder& order) noexcept;  // above the pointer's target
   // Brings the tip to its rest above the pointer's target, or as close to it as the tool stays clear of the bone. True:
@@ -108,6 +115,7 @@ class PointerSession final : public Session {
   HapticLoop loop_;
   LoopReport last_;
   PointerCommand command_;
+  std::vector<double> worn_;  // of each tool: the wear that was commanded last; 0: none yet
   HandCommand hand_;
   Eigen::Quaterniond rotation_ = Eigen::Quaterniond::Identity();  // of the tool in the hand
   int held_ = 0;                                                  // tool in the hand

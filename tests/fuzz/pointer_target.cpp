@@ -20,7 +20,8 @@ bool is_unit(const Eigen::Quaterniond& q) { return within(q.norm(), 1.0 - 1e-12,
 void check_input(const PointerInput& input) {
   OSTEON_CHECK(is_near(input.target_mm, 1e5) && is_unit(input.rotation_bone_tool));
   OSTEON_CHECK(within(input.push_n, kLeastPush_n, kMostPush_n) && within(input.spindle, 0.0, 1.0));
-  OSTEON_CHECK(within(input.spindle_rpm, 0.0, 2e5) && input.tool.size() <= 512);
+  OSTEON_CHECK(within(input.spindle_rpm, 0.0, 2e5) && input.tool.size() <= 512 && input.law.size() <= 512);
+  OSTEON_CHECK(!input.wear || within(*input.wear, kSharp, kBluntest));
   Result<PointerInput> again = read_pointer_input(encode(input));
   OSTEON_CHECK(again && again->rotation_bone_tool.isApprox(input.rotation_bone_tool, 1e-12));
   again->rotation_bone_tool = input.rotation_bone_tool;
@@ -30,9 +31,11 @@ void check_input(const PointerInput& input) {
 void check_output(const PointerOutput& output) {
   OSTEON_CHECK(is_near(output.pose_bone_tool.position_mm, 1e5) && is_unit(output.pose_bone_tool.rotation));
   OSTEON_CHECK(is_near(output.force_hand_n, 1e6) && is_near(output.force_bone_n, 1e6));
-  OSTEON_CHECK(output.tool.size() <= 512 && output.trouble.size() <= 512);
+  OSTEON_CHECK(output.tool.size() <= 512 && output.law.size() <= 512 && output.trouble.size() <= 512);
+  OSTEON_CHECK(!output.wear || within(*output.wear, kSharp, kBluntest));
   const Result<PointerOutput> again = read_pointer_output(encode(output));
   OSTEON_CHECK(again && again->trouble == output.trouble && again->tool == output.tool);
+  OSTEON_CHECK(again->wear == output.wear && again->law == output.law);
   OSTEON_CHECK(again->pose_bone_tool.position_mm == output.pose_bone_tool.position_mm);
   OSTEON_CHECK(again->depth_mm == output.depth_mm && again->push_n == output.push_n);
   OSTEON_CHECK(again->pushing == output.pushing && again->on_metal == output.on_metal);
@@ -82,10 +85,14 @@ Target pointer_message_target() {
   input.target_mm = {1.25, -20.5, 300.0};
   input.on_bone = input.push = true;
   input.tool = "drill-3.2";
+  input.wear = 1.5;
+  input.law = "allotta";
   PointerOutput output;
   output.force_bone_n = {0.0, 1.5, -27.25};
   output.pushing = true;
   output.tool = "burr-round-5";
+  output.wear = 2.25;
+  output.law = "milling";
   output.trouble = "the tool \"gr\u00f6\u00dfer\" cannot be held";
   Target target{"pointer_message",
                 read_message,

@@ -1,9 +1,20 @@
-// The gauges of the window: when the plot is drawn, and what the devices of others hold.
+// The gauges of the window: when the plot is drawn, and what the devices of others hold. And the tool dialog, whose
+// choices the gauges show.
 #include <gtest/gtest.h>
 
+#include <QAction>
+#include <QComboBox>
+#include <QDoubleSpinBox>
+#include <QLabel>
+#include <QLocale>
+#include <QStatusBar>
 #include <QTest>
+#include <fstream>
+#include <iterator>
+#include <memory>
+#include <string>
 
-#include "tests/integration/desk.hpp"
+#include "tests/integration/window_bench.hpp"
 #include "viewer_client/desktop/gauges_panel.hpp"
 
 namespace osteon {
@@ -61,6 +72,90 @@ TEST(HandForce, IsThePointersElseThatOfTheStatesDevice) {
   output.device_holds_n = 30.0;
   EXPECT_EQ(hand_force(state, output)->hand_n, 5.0);
   EXPECT_EQ(hand_force(state, output)->device_holds_n, 30.0);
+}
+
+class ToolDialog : public test::WindowBench {
+ protected:
+  // The number of a gauge.
+  [[nodiscard]] double gauge(const char* name) const { return QLocale().toDouble(label(name).section(' ', 0, 0)); }
+  // The haptic client says so of the tool over the bone.
+  [[nodiscard]] bool is_as_blunt_as(const char* wear) {
+    return until([&] {
+      hover(middle());
+      return label("wear") == wear;
+    });
+  }
+  void type_wear(const char* wear) {
+    auto* box = window_->findChild<QDoubleSpinBox*>("wear_set");
+    ASSERT_NE(box, nullptr);
+    box->setFocus();
+    box->selectAll();
+    QTest::keyClicks(box, wear);
+    QTest::keyClick(box, Qt::Key_Return);
+  }
+  // The only haptic client of this window shows force in this way, and is connected.
+  [[nodiscard]] bool shows_force(const std::string& choice) {
+    return until([&] {
+      const auto clients = test::children("osteon-haptic");
+      if (clients.size() != 1) return false;
+      std::ifstream file("/proc/" + std::to_string(clients[0]) + "/cmdline", std::ios::binary);
+      const std::string options(std::istreambuf_iterator<char>(file), {});
+      const std::string wanted = std::string("--force-choice") + '\0' + choice + '\0';
+      return options.find(wanted) != std::string::npos && label("device") == "Pointer";
+    });
+  }
+};
+
+// One session for all, because each window starts a server and two clients.
+TEST_F(ToolDialog, WearLawAndForceChoiceReachTheToolInTheHand) {
+  open();
+  ASSERT_TRUE(shows_force("proportional")) << problem();
+  EXPECT_EQ(label("temperature"), "not simulated");
+  click_tool("drill");
+  ASSERT_TRUE(is_as_blunt_as("1.00")) << problem();
+  type_wear("2.5");
+  EXPECT_TRUE(is_as_blunt_as("2.50")) << problem();
+  // Four laws fit a drill, and its own one is shown.
+  auto* law = window_->findChild<QComboBox*>("law_set");
+  ASSERT_EQ(law->count(), 4);
+  EXPECT_EQ(law->currentText(), "Measured thrust");
+  law->setFocus();
+  QTest::keyClick(law, Qt::Key_Down);
+  EXPECT_EQ(law->currentText(), "Energy of the removed volume");
+  EXPECT_EQ(view_->pointer().input().law, "allotta");
+  // Another tool has its own edge. The drill gets its wear and law back.
+  click_tool("bur");
+  EXPECT_TRUE(is_as_blunt_as("1.00")) << problem();
+  EXPECT_EQ(law->currentText(), "Milling");
+  click_tool("drill");
+  EXPECT_EQ(law->currentText(), "Energy of the removed volume");
+  EXPECT_EQ(view_->pointer().input().law, "allotta");
+  EXPECT_TRUE(is_as_blunt_as("2.50")) << problem();
+  // An item is placed by a click, so it has no edge to choose.
+  click_tool("pin");
+  EXPECT_FALSE(law->isEnabled());
+  EXPECT_FALSE(window_->findChild<QDoubleSpinBox*>("wear_set")->isEnabled());
+
+  // Another way to show force starts the client again. Its drill is as blunt as before, and the hand gets less than the
+  // bone gives.
+  trigger("force_compressed");
+  EXPECT_EQ(window_->statusBar()->currentMessage(), "The haptic client starts again with it.");
+  ASSERT_TRUE(shows_force("compressed")) << problem();
+  click_tool("drill");
+  ASSERT_TRUE(is_as_blunt_as("2.50")) << problem();
+  view_->pointer().set_push(30.0);
+  press(middle());
+  EXPECT_TRUE(push_until([&] {
+    return gauge("force_bone") > 15.0 && gauge("force_hand") < 0.85 * gauge("force_bone");
+  })) << problem()
+      << ", hand " << label("force_hand").toStdString();
+  release(middle());
+  // The choice is there at the next start.
+  window_ = std::make_unique<MainWindow>();
+  show();
+  EXPECT_TRUE(window_->findChild<QAction*>("force_compressed")->isChecked());
+  trigger("force_proportional");
+  EXPECT_EQ(window_->statusBar()->currentMessage(), "The next practice room begins with it.");
 }
 
 }  // namespace

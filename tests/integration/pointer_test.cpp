@@ -303,6 +303,48 @@ TEST_F(PointerInRoom, ItsRecordingIsPlayedAgainInAnotherRoom) {
               testing::HasSubstr("leave out --plan and give the --tool that it began with, drill-3.2"));
 }
 
+// Only the newest message counts. The tool need not be taken anew.
+TEST_F(PointerInRoom, WearAndLawOfTheToolChangeWithoutARestart) {
+  const Stage stage(24.0);
+  Process haptic = start(stage);
+  const auto cuts_as = [&](double wear, const std::string& law) {
+    return say_until([&](const PointerOutput& said) {
+      return said.trouble.empty() && said.wear && std::abs(*said.wear - wear) < 0.01 && said.law == law;
+    });
+  };
+  ASSERT_TRUE(cuts_as(1.0, "chi")) << haptic.err();
+  input_.wear = 2.0;
+  input_.law = "allotta";
+  EXPECT_TRUE(cuts_as(2.0, "allotta")) << haptic.err();
+  input_.spindle = 1.0;
+  ASSERT_TRUE(say_until_rests()) << haptic.err();
+  ASSERT_TRUE(press()) << haptic.err();
+  ASSERT_TRUE(say_until([](const PointerOutput& said) { return said.depth_mm > 0.5; })) << haptic.err();
+  input_.wear = 1.5;
+  input_.law = "";
+  EXPECT_TRUE(cuts_as(1.5, "chi")) << haptic.err();
+  EXPECT_TRUE(window_->newest()->pushing) << "the tool stays in the bone";
+  input_.push = false;
+
+  // A law that is none, or is for others, is named. The tool leaves the bone, and keeps the law that it had.
+  for (const auto& [law, says] : {std::pair("hooke", "there is no force law \"hooke\""),
+                                  std::pair("saw", "the force law \"saw\" is not for a drill")}) {
+    input_.law = law;
+    ASSERT_TRUE(say_until([](const PointerOutput& said) { return !said.trouble.empty(); })) << haptic.err();
+    EXPECT_THAT(window_->newest()->trouble, testing::HasSubstr(says));
+    EXPECT_THAT(window_->newest()->trouble, testing::HasSubstr("choose one of chi, allotta"));
+    EXPECT_EQ(window_->newest()->law, "chi");
+    EXPECT_TRUE(say_until([&](const PointerOutput&) { return tip_z_mm() > 1.0; }));
+    input_.law = "";
+    EXPECT_TRUE(cuts_as(1.5, "chi")) << haptic.err();
+  }
+  // The wear is of the drill. Another tool is sharp.
+  input_.tool = "burr-round-5";
+  input_.wear.reset();
+  EXPECT_TRUE(cuts_as(1.0, "milling")) << haptic.err();
+  ASSERT_EQ(haptic.terminate(), 0) << haptic.err();
+}
+
 TEST_F(PointerInRoom, WhatIsWrongIsSaidBeforeAServerIsLookedFor) {
   const auto said = [&](std::vector<std::string> more) {
     std::vector<std::string> all{"--server", "127.0.0.1:1", "--plain", "--timeout", "0"};

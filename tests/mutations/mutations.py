@@ -9,6 +9,7 @@ LEDGER = "haptic_client/rendering/energy_ledger.cpp"
 PIXELS = "server/import/dicom_pixels.cpp"
 APPLY = "server/room/room_apply.cpp"
 LINK, MESSAGE = "common/input/local_link.cpp", "common/input/link_message.cpp"
+LOOP = "haptic_client/rendering/haptic_loop.cpp"
 POINTED = "haptic_client/simulation/pointer_session.cpp"
 
 MUTATIONS = [
@@ -289,6 +290,10 @@ MUTATIONS = [
     M(POINTED, "command_.tool == held_ && command_.spindle_rpm > 0.0", "command_.spindle_rpm > 0.0",
       "a tool in the bone turns at the speed of the tool that comes next", "unit.pointed_hand",
       "PointedHand.AnotherTool*"),
+    M(POINTED, "command_.wear > 0.0 && command_.wear != worn_[tool]", "command_.wear > 0.0",
+      "a message that comes again sharpens the tool", "unit.pointed_hand", "PointedHand.TheEdge*"),
+    M(LOOP, "  effects_[static_cast<std::size_t>(tool)].set_wear(wear);\n", "",
+      "a tool stays as sharp as it was", "unit.haptic_effects", "ToolEffects.AnEdge*"),
     M(POINTED, "input.may_cut = phase_ >= PointerPhase::pushes;", "input.may_cut = true;",
       "a turning tool that rests cuts while it is moved", "unit.pointed_hand", "PointedHand.ATilted*"),
     M(MESSAGE, "if (!(value >= least && value <= most)) return wrong(name), least;", "",

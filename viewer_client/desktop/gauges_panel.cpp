@@ -93,6 +93,8 @@ GaugesPanel::GaugesPanel(QWidget* parent) : QWidget(parent) {
   feed_ = gauge(tr("Feed"), "feed");
   density_ = gauge(tr("Density"), "density");
   flutes_ = gauge(tr("Flutes filled"), "flutes");
+  wear_ = gauge(tr("Wear"), "wear");
+  gauge(tr("Temperature"), "temperature")->setText(tr("not simulated"));
   budget_ = new QProgressBar;
   budget_->setObjectName("budget");
   budget_->setTextVisible(false);
@@ -163,6 +165,7 @@ void GaugesPanel::show(const CuttingState& state, const std::optional<PointerOut
   const bool in_bone = state.engaged_fraction > 0.0;
   density_->setText(in_bone ? tr("%1 g/cm³").arg(number(state.density_g_cm3, 2)) : QString("–"));
   flutes_->setText(state.flutes_full > 0.0 ? tr("%1 %").arg(number(100.0 * state.flutes_full, 0)) : QString("–"));
+  wear_->setText(pointer && pointer->wear ? number(*pointer->wear, 2) : QString("–"));
   show_budget(hand);
   plot_->add(at_s, bone_n, hand_n);
 }

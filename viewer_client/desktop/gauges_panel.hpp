@@ -1,5 +1,6 @@
-// The gauges of the tool: push, force of the bone and on the hand, torque, depth, spindle, feed, density and flutes. A
-// plot shows both forces over the last ten seconds, and a bar how much of what the device holds the hand gets.
+// The gauges of the tool: push, force of the bone and on the hand, torque, depth, spindle, feed, density, flutes and
+// wear. Temperature has its place and says that it is not simulated. A plot shows both forces over the last ten
+// seconds, and a bar how much of what the device holds the hand gets.
 #pragma once
 #include <QCoreApplication>
 #include <QWidget>
@@ -60,7 +61,7 @@ class GaugesPanel : public QWidget {
 
  private:
   void show_budget(const std::optional<HandForce>& hand);
-  QLabel *bone_, *hand_, *torque_, *depth_, *spindle_, *feed_, *density_, *flutes_, *push_;
+  QLabel *bone_, *hand_, *torque_, *depth_, *spindle_, *feed_, *density_, *flutes_, *wear_, *push_;
   QProgressBar* budget_;  // force on the hand as a share of what the device holds for long
   QLabel *budget_words_, *saturated_;
   ScrollingPlot* plot_;

@@ -33,6 +33,7 @@
 #include "viewer_client/desktop/bone_view.hpp"
 #include "viewer_client/desktop/clipping_panel.hpp"
 #include "viewer_client/desktop/connection_panel.hpp"
+#include "viewer_client/desktop/force_menu.hpp"
 #include "viewer_client/desktop/gauges_panel.hpp"
 #include "viewer_client/desktop/pad_hand.hpp"
 #include "viewer_client/desktop/properties_panel.hpp"
@@ -148,6 +149,7 @@ void MainWindow::make_panels() {
         if (chosen.push_n != view_->pointer().push_n()) tour_->did(TourStep::strength);
         view_->pointer().set_spindle_speed(chosen.spindle_rpm);
         view_->pointer().set_push(chosen.push_n);
+        view_->pointer().set_edge(chosen.edge.wear, chosen.edge.law);
         send_pointer();
       },
       [this](const std::string& tool) { take_tool(tool); });
@@ -269,6 +271,7 @@ void MainWindow::practise(const std::filesystem::path& bone, const std::filesyst
   options.folder = session.empty() ? new_session_folder(bone) : session;
   options.cache = data_folder() / "cache";
   options.tool = first_tool_.empty() ? kFirstTool : QString::fromStdString(first_tool_);
+  options.force_choice = chosen_force();
   options.sound = sound_->isChecked();
   QDir().mkpath(text_of(options.cache));
 
@@ -403,11 +406,14 @@ void MainWindow::room_ended(const QString& sentence) {
 
 void MainWindow::take_tool(const std::string& tool) {
   if (!room_ || watching_) return tools_->show_held({});
-  properties_->show_tool(tool);
+  const bool held = can_hold(tool) && pointer_;
+  properties_->show_tool(tool, held);
   tools_->show_held(tool);
-  if (can_hold(tool) && pointer_) {
+  if (held) {
     placing_.clear();
     view_->pointer().take(tool);
+    const PropertiesPanel::Edge edge = properties_->chosen().edge;
+    view_->pointer().set_edge(edge.wear, edge.law);
     view_->set_holding(true);
     spindle_->setChecked(true);
     view_->pointer().set_spindle(true);

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "viewer_client/desktop/bone_view.hpp"
+#include "viewer_client/desktop/force_menu.hpp"
 #include "viewer_client/desktop/language.hpp"
 #include "viewer_client/desktop/main_window.hpp"
 #include "viewer_client/desktop/menu_keys.hpp"
@@ -126,6 +127,11 @@ void MainWindow::make_tools_menu() {
       true);
   spindle_->setCheckable(true);
   make_other_hand(tools);
+  fill_force_menu(*tools->addMenu(tr("Force on the hand")), [this] {
+    if (!practice_) return say(tr("The next practice room begins with it."));
+    practice_->show_force(chosen_force());
+    say(tr("The haptic client starts again with it."));
+  });
   sound_ = add_action(
       tools, tr("S&ound"), "sound", QKeySequence("Ctrl+Shift+S"),
       [this] { sound_control_->set_on(sound_->isChecked()); }, false);

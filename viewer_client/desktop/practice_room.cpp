@@ -20,6 +20,7 @@ constexpr int kRestart_ms = 300;
 // What ends as it should needs a second for all. A program that hangs must not hold the window, and what it
 // acknowledged is on the disk: the journal syncs before it acknowledges. So it is killed.
 constexpr std::chrono::milliseconds kClientsEnd{1200}, kAllEnd{1700};
+constexpr int kEnd_ms = 8000;  // for a child that starts again
 
 }  // namespace
 
@@ -119,9 +120,10 @@ void PracticeRoom::start_haptic() {
   connect(haptic_.get(), &QProcess::errorOccurred, this, [this](QProcess::ProcessError error) {
     if (error == QProcess::FailedToStart) fail(tr("osteon-haptic is not installed. Install the package osteon."));
   });
-  haptic_->start(program_path("osteon-haptic"),
-                 {"--server", address_, "--plain", "--device", "pointer:" + text_of(options_.pointer), "--tool",
-                  options_.tool, "--cache", text_of(options_.cache), "--timeout", "60"});
+  haptic_->start(
+      program_path("osteon-haptic"),
+      {"--server", address_, "--plain", "--device", "pointer:" + text_of(options_.pointer), "--tool", options_.tool,
+       "--force-choice", options_.force_choice, "--cache", text_of(options_.cache), "--timeout", "60"});
   QTimer::singleShot(kSettled_ms, haptic_.get(), [this] { haptic_deaths_ = 0; });
 }
 
@@ -149,6 +151,14 @@ void PracticeRoom::want_sound() {
   if (!audio_ && !address_.isEmpty()) start_audio();
 }
 
+void PracticeRoom::show_force(const QString& choice) {
+  if (std::exchange(options_.force_choice, choice) == choice) return;
+  if (!haptic_ || haptic_->state() == QProcess::NotRunning) return;  // it is about to start
+  haptic_renewed_ = true;
+  haptic_->terminate();
+  QTimer::singleShot(kEnd_ms, haptic_.get(), [child = haptic_.get()] { child->kill(); });
+}
+
 void PracticeRoom::server_ended() {
   if (over_) return;
   address_timer_.stop();
@@ -161,6 +171,10 @@ void PracticeRoom::server_ended() {
 
 void PracticeRoom::haptic_ended() {
   if (over_) return;
+  if (std::exchange(haptic_renewed_, false)) {
+    QTimer::singleShot(0, this, [this] { start_haptic(); });
+    return;
+  }
   const QString why = haptic_past_.why = end_of(*haptic_);
   if (++haptic_deaths_ >= kMostDeaths) return fail(why);
   events_.notice(tr("The haptic client ended and starts again."));

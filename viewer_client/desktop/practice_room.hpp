@@ -21,7 +21,8 @@ struct PracticeOptions {
   std::filesystem::path cache;    // where the haptic client keeps cases
   std::filesystem::path pointer;  // socket of the window's pointer
   std::filesystem::path sound_socket;
-  QString tool;  // that the hand holds first
+  QString tool;          // that the hand holds first
+  QString force_choice;  // as --force-choice of the haptic client names it
   bool sound = true;
 };
 
@@ -46,6 +47,8 @@ class PracticeRoom : public QObject {
   [[nodiscard]] ProgramState audio_state() const { return state_of(audio_.get(), audio_past_); }
   // Starts the audio client when the sound is wanted for the first time. Its socket switches it off and on again.
   void want_sound();
+  // The haptic client ends and starts again, to show force in another way.
+  void show_force(const QString& choice);
 
  private:
   // Why a program ended, as a sentence that names it.
@@ -77,6 +80,7 @@ class PracticeRoom : public QObject {
   int server_deaths_ = 0, haptic_deaths_ = 0, audio_deaths_ = 0;
   std::unique_ptr<FileLock> session_;  // while the room is there
   bool over_ = false;
+  bool haptic_renewed_ = false;  // its end is wanted: it is to start with other options
   Past server_past_, haptic_past_, audio_past_;
   std::unique_ptr<ChildProcess> server_, haptic_, audio_;
 };

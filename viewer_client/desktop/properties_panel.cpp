@@ -4,13 +4,17 @@
 #include <QCheckBox>
 #include <QComboBox>
 #include <QCoreApplication>
+#include <QDoubleSpinBox>
 #include <QFormLayout>
 #include <QLabel>
 #include <QLocale>
 #include <QSpinBox>
 #include <algorithm>
+#include <initializer_list>
 #include <utility>
 
+#include "common/input/pointer_link.hpp"
+#include "common/mechanics/force_law.hpp"
 #include "common/tools/tool.hpp"
 #include "viewer_client/desktop/tool_names.hpp"
 #include "viewer_client/scene/tool_groups.hpp"
@@ -21,6 +25,13 @@ namespace osteon {
 namespace {
 
 constexpr int kMostRpm = 100000;
+
+// Wide enough for each of its items, and empty. So the panel, and with it the picture beside it, never changes its
+// width.
+void fix_width(QComboBox& box) {
+  box.setMinimumWidth(box.sizeHint().width());
+  box.clear();
+}
 
 }  // namespace
 
@@ -36,11 +47,9 @@ PropertiesPanel::PropertiesPanel(std::function<void(const Chosen&)> changed,
   size_ = new QComboBox;
   size_->setObjectName("size");
   size_->setAccessibleName(tr("Tool"));
-  // Wide enough for every tool, so that the panel, and with it the picture beside it, never changes its width.
   for (const ToolGroup& group : tool_groups())
     for (const std::string& tool : group.tools) size_->addItem(tool_title(tool));
-  size_->setMinimumWidth(size_->sizeHint().width());
-  size_->clear();
+  fix_width(*size_);
   form_->addRow(size_);
   rpm_ = new QSpinBox;
   rpm_->setRange(0, kMostRpm);
@@ -55,6 +64,21 @@ PropertiesPanel::PropertiesPanel(std::function<void(const Chosen&)> changed,
   row(tr("Teeth"), "teeth", teeth_);
   feed_ = new QLabel;
   row(tr("Feed per revolution"), "feed_per_turn", feed_);
+  wear_ = new QDoubleSpinBox;
+  wear_->setRange(kSharp, kBluntest);
+  wear_->setDecimals(1);
+  wear_->setSingleStep(0.1);
+  wear_->setKeyboardTracking(false);  // a number is whole when the user has left it
+  wear_->setToolTip("<p>" + tr("1 is sharp, 2 is blunt. A change acts at once, also while the tool cuts.") + ' ' +
+                    tr("Cutting blunts the tool further. The gauge shows how blunt it is.") + "</p>");
+  row(tr("Wear"), "wear_set", wear_);
+  law_ = new QComboBox;
+  law_->setObjectName("law_set");
+  law_->setAccessibleName(tr("Force law"));
+  for (const ForceLaw& law : force_laws()) law_->addItem(law_title(std::string(law.name)));
+  fix_width(*law_);
+  form_->addRow(new QLabel(tr("Force law")));
+  form_->addRow(law_);  // over the whole width, because names of laws are long
   const auto say = [this] {
     if (!showing_) changed_(chosen());
   };
@@ -62,14 +86,38 @@ PropertiesPanel::PropertiesPanel(std::function<void(const Chosen&)> changed,
   connect(push_, QOverload<int>::of(&QSpinBox::valueChanged), this, say);
   connect(size_, QOverload<int>::of(&QComboBox::activated), this,
           [this](int index) { resized_(size_->itemData(index).toString().toStdString()); });
+  connect(wear_, QOverload<double>::of(&QDoubleSpinBox::valueChanged), this, [this, say](double wear) {
+    if (!showing_) edges_[tool_].wear = wear;
+    say();
+  });
+  connect(law_, QOverload<int>::of(&QComboBox::currentIndexChanged), this, [this, say](int index) {
+    const QString law = law_->itemData(index).toString();
+    law_->setToolTip(law.isEmpty() ? QString() : tr("The law \"%1\" in the list of osteon-haptic laws").arg(law));
+    if (!showing_) edges_[tool_].law = law.toStdString();
+    say();
+  });
   setEnabled(false);
 }
 
-void PropertiesPanel::show_tool(const std::string& name) {
+void PropertiesPanel::show_edge(const Tool& tool, bool held) {
+  const auto chosen = edges_.find(tool.name);
+  const Edge edge = chosen == edges_.end() ? Edge{} : chosen->second;
+  wear_->setValue(edge.wear.value_or(kSharp));
+  law_->clear();
+  for (const ForceLaw& law : force_laws())
+    if (tool.cuts() && law.fits(tool.kind))
+      law_->addItem(law_title(std::string(law.name)), QString::fromStdString(std::string(law.name)));
+  if (const Result<const ForceLaw*> law = choose_law(tool, edge.law))
+    law_->setCurrentIndex(law_->findData(QString::fromStdString(std::string((*law)->name))));
+  for (QWidget* part : std::initializer_list<QWidget*>{wear_, law_}) part->setEnabled(held);
+}
+
+void PropertiesPanel::show_tool(const std::string& name, bool held) {
   const Result<Tool> tool = find_tool(name);
   setEnabled(tool.has_value());
   if (!tool) return;
   showing_ = true;
+  tool_ = name;
   size_->clear();
   for (const ToolGroup& group : tool_groups()) {
     if (std::find(group.tools.begin(), group.tools.end(), name) == group.tools.end()) continue;
@@ -81,6 +129,7 @@ void PropertiesPanel::show_tool(const std::string& name) {
   teeth_->setText(tool->teeth > 0 ? QString::number(tool->teeth) : QString("–"));
   feed_->setText(tool->feed_mm_per_rev > 0.0 ? tr("%1 mm").arg(QLocale().toString(tool->feed_mm_per_rev, 'g', 3))
                                              : QString("–"));
+  show_edge(*tool, held);
   showing_ = false;
 }
 
@@ -103,7 +152,9 @@ void PropertiesPanel::add_switch(QAction& action) {
 }
 
 PropertiesPanel::Chosen PropertiesPanel::chosen() const {
-  return {static_cast<double>(rpm_->value()), static_cast<double>(push_->value())};
+  const auto edge = edges_.find(tool_);
+  return {static_cast<double>(rpm_->value()), static_cast<double>(push_->value()),
+          edge == edges_.end() ? Edge{} : edge->second};
 }
 
 }  // namespace osteon

@@ -1,39 +1,52 @@
-// The properties of the tool in the hand, as in Niu 2008, Figure 9.6: size, spindle speed, push, teeth, feed. A
-// change reaches picture, force and sound at once.
+// The properties of the tool in the hand, as in Niu 2008, Figure 9.6: size, spindle speed, push, teeth, feed, and how
+// its edge cuts: wear and force law. A change reaches picture, force and sound at once.
 #pragma once
 #include <QCoreApplication>
 #include <QWidget>
 #include <functional>
+#include <map>
+#include <optional>
 #include <string>
 
 class QAction;
 class QComboBox;
+class QDoubleSpinBox;
 class QFormLayout;
 class QLabel;
 class QSpinBox;
 
 namespace osteon {
 
+struct Tool;
+
 class PropertiesPanel : public QWidget {
   Q_DECLARE_TR_FUNCTIONS(PropertiesPanel)
 
  public:
+  // What the user chose of a tool's edge, until the window closes.
+  struct Edge {
+    std::optional<double> wear;  // none: as the tool is
+    std::string law;             // empty: the tool's own
+  };
   struct Chosen {
     double spindle_rpm = 0;
     double push_n = 10;
+    Edge edge;
   };
   // `resized`: the user chose the tool of another size in the same group.
   PropertiesPanel(std::function<void(const Chosen&)> changed, std::function<void(const std::string&)> resized,
                   QWidget* parent = nullptr);
 
-  // Shows the tool's own values.
-  void show_tool(const std::string& tool);
+  // Shows the tool's own values, and the edge that was chosen for it. `held`: it can be held here, so its edge counts.
+  void show_tool(const std::string& tool, bool held);
   void show_push(double push_n);
   // A check box for an action that can be checked. Either shows the other's state.
   void add_switch(QAction& action);
   [[nodiscard]] Chosen chosen() const;
 
  private:
+  void show_edge(const Tool& tool, bool held);
+
   std::function<void(const Chosen&)> changed_;
   std::function<void(const std::string&)> resized_;
   bool showing_ = false;  // its own change of a value is none of the user's
@@ -41,6 +54,10 @@ class PropertiesPanel : public QWidget {
   QComboBox* size_;
   QSpinBox *rpm_, *push_;
   QLabel *teeth_, *feed_;
+  QDoubleSpinBox* wear_;
+  QComboBox* law_;
+  std::string tool_;                   // shown
+  std::map<std::string, Edge> edges_;  // of each tool whose edge was chosen
 };
 
 }  // namespace osteon

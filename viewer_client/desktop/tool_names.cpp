@@ -41,6 +41,14 @@ namespace {
                                                         QT_TRANSLATE_NOOP("Tools", "Trial cup 50 mm"),
                                                         QT_TRANSLATE_NOOP("Tools", "Trial stem")};
 
+using Titles = std::map<std::string, const char*>;
+
+// The name itself, if there is no title.
+QString title_in(const Titles& titles, const std::string& name) {
+  const auto found = titles.find(name);
+  return found == titles.end() ? QString::fromStdString(name) : QCoreApplication::translate("Tools", found->second);
+}
+
 }  // namespace
 
 QString tool_title(const std::string& name) {
@@ -50,13 +58,25 @@ QString tool_title(const std::string& name) {
 }
 
 QString group_title(const std::string& name) {
-  static const std::map<std::string, const char*> titles{
+  static const Titles titles{
       {"drill", QT_TRANSLATE_NOOP("Tools", "Drills")},    {"bur", QT_TRANSLATE_NOOP("Tools", "Burs")},
       {"saw", QT_TRANSLATE_NOOP("Tools", "Saws")},        {"reamer", QT_TRANSLATE_NOOP("Tools", "Reamers")},
       {"broach", QT_TRANSLATE_NOOP("Tools", "Broaches")}, {"guide", QT_TRANSLATE_NOOP("Tools", "Guides and trials")},
       {"pin", QT_TRANSLATE_NOOP("Tools", "Pins")},        {"screw", QT_TRANSLATE_NOOP("Tools", "Screws")}};
-  const auto found = titles.find(name);
-  return found == titles.end() ? QString::fromStdString(name) : QCoreApplication::translate("Tools", found->second);
+  return title_in(titles, name);
+}
+
+QString law_title(const std::string& name) {
+  static const Titles titles{{"chi", QT_TRANSLATE_NOOP("Tools", "Measured thrust")},
+                             {"allotta", QT_TRANSLATE_NOOP("Tools", "Energy of the removed volume")},
+                             {"agus", QT_TRANSLATE_NOOP("Tools", "Erosion")},
+                             {"milling", QT_TRANSLATE_NOOP("Tools", "Milling")},
+                             {"spring-damper", QT_TRANSLATE_NOOP("Tools", "Spring and damper")},
+                             {"multi-point", QT_TRANSLATE_NOOP("Tools", "Sum over contact points")},
+                             {"saw", QT_TRANSLATE_NOOP("Tools", "Single teeth of a saw")},
+                             {"reamer", QT_TRANSLATE_NOOP("Tools", "Reaming")},
+                             {"broach", QT_TRANSLATE_NOOP("Tools", "Blows of a mallet")}};
+  return title_in(titles, name);
 }
 
 }  // namespace osteon

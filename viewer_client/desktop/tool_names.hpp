@@ -1,4 +1,4 @@
-// Names of tools and of their groups in the user's language.
+// Names of tools, of their groups and of force laws in the user's language.
 #pragma once
 #include <QString>
 #include <string>
@@ -9,5 +9,7 @@ namespace osteon {
 [[nodiscard]] QString tool_title(const std::string& name);
 // `name`: of a group in tool_groups().
 [[nodiscard]] QString group_title(const std::string& name);
+// `name`: of a law in force_laws().
+[[nodiscard]] QString law_title(const std::string& name);
 
 }  // namespace osteon

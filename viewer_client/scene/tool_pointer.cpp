@@ -33,6 +33,7 @@ void ToolPointer::take(const std::string& tool) {
   input_.tool = tool;
   input_.empty_hand = input_.push = false;
   input_.spindle_rpm = 0.0;
+  set_edge(std::nullopt, {});
   turn_.setIdentity();
   roll_rad_ = 0.0;
   aim();
@@ -43,6 +44,11 @@ void ToolPointer::put_down() {
   input_.push = false;
   input_.spindle_rpm = 0.0;
   leave();
+}
+
+void ToolPointer::set_edge(const std::optional<double>& wear, const std::string& law) {
+  input_.wear = wear;
+  input_.law = law;
 }
 
 void ToolPointer::move(const SightRay& ray, const SurfaceScene& surface) {

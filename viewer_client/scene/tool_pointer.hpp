@@ -13,13 +13,15 @@ namespace osteon {
 // [render]
 class ToolPointer {
  public:
-  // The tool that the hand is to hold. Its turn begins anew.
+  // The tool that the hand is to hold. Its turn begins anew. Speed, wear and law are the tool's own.
   void take(const std::string& tool);
   // The hand is empty, as at the beginning.
   void put_down();
   void set_irrigation(bool on) { input_.irrigation = on; }
   void set_suction(bool on) { input_.suction = on; }
   void set_spindle_speed(double rpm) { input_.spindle_rpm = rpm; }  // 0: the tool's own
+  // Wear and force law of the tool, as PointerInput says.
+  void set_edge(const std::optional<double>& wear, const std::string& law);
 
   // The pointer moved to this ray. While nobody pushes, the tool rests where the ray meets the surface and points along
   // the mean normal into the bone. While somebody pushes, the tool keeps its direction and moves across it.

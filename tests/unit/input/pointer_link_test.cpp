@@ -38,6 +38,8 @@ PointerInput an_input() {
   input.spindle = 0.75;
   input.spindle_rpm = 1200.0;
   input.tool = "drill-3.2";
+  input.wear = 1.75;
+  input.law = "allotta";
   input.source = PointerSource::game_pad;
   return input;
 }
@@ -52,6 +54,8 @@ PointerOutput an_output() {
   output.pushing = output.on_metal = output.saturated = true;
   output.device_holds_n = 0.88;
   output.tool = "burr-round-5";
+  output.wear = 2.5;
+  output.law = "milling";
   output.trouble = "the tool \"größer\" cannot be held";
   return output;
 }
@@ -68,6 +72,8 @@ void expect_same(const PointerOutput& a, const PointerOutput& b) {
   EXPECT_EQ(a.saturated, b.saturated);
   EXPECT_EQ(a.device_holds_n, b.device_holds_n);
   EXPECT_EQ(a.tool, b.tool);
+  EXPECT_EQ(a.wear, b.wear);
+  EXPECT_EQ(a.law, b.law);
   EXPECT_EQ(a.trouble, b.trouble);
 }
 
@@ -128,8 +134,8 @@ std::vector<json> no_number(double least, double most) {
           -1e300,  1e300};
 }
 
-// Fields that an older window does not send.
-const std::set<std::string> kOptional{"irrigation", "suction", "empty_hand"};
+// Fields that an older program does not send.
+const std::set<std::string> kOptional{"irrigation", "suction", "empty_hand", "wear", "law"};
 
 // Each value alone, and the absence of a field that must be there, is refused with a sentence that names the field.
 void expect_each_refused(const std::string& valid, const Wrong& wrong, Refusal refusal) {
@@ -165,19 +171,35 @@ TEST(PointerMessage, EachFieldOfTheWindowIsChecked) {
                        {"spindle", no_number(0.0, 1.0)},
                        {"spindle_rpm", no_number(0.0, 2e5)},
                        {"tool", kNoText},
+                       {"wear", no_number(kSharp, kBluntest)},
+                       {"law", kNoText},
                        {"source", {nullptr, 2, true, "", "Mouse", "game pad ", std::string(513, 'x')}}},
                       input_refusal);
 }
 
-TEST(PointerMessage, AnOlderWindowHasNoOtherHand) {
+TEST(PointerMessage, AnOlderWindowHasNoOtherHandAndChangesNoEdge) {
   json message = json::parse(encode(an_input()));
-  message.erase("irrigation");
-  message.erase("suction");
+  for (const std::string& field : kOptional) message.erase(field);
   const auto read = read_pointer_input(message.dump());
   ASSERT_TRUE(read) << read.error().message;
   PointerInput expected = an_input();
   expected.irrigation = expected.suction = false;
+  expected.wear.reset();
+  expected.law.clear();
   EXPECT_EQ(*read, expected);
+  // A window that has nothing to say of the wear sends no such field.
+  EXPECT_FALSE(json::parse(encode(expected)).contains("wear"));
+}
+
+TEST(PointerMessage, AnOlderClientDoesNotSayHowItsToolCuts) {
+  json message = json::parse(encode(an_output()));
+  for (const std::string& field : kOptional) message.erase(field);
+  const auto read = read_pointer_output(message.dump());
+  ASSERT_TRUE(read) << read.error().message;
+  PointerOutput expected = an_output();
+  expected.wear.reset();
+  expected.law.clear();
+  expect_same(*read, expected);
 }
 
 TEST(PointerMessage, EachFieldOfTheHapticClientIsChecked) {
@@ -194,6 +216,8 @@ TEST(PointerMessage, EachFieldOfTheHapticClientIsChecked) {
                        {"saturated", kNoBool},
                        {"device_holds_n", no_number(0.0, 1e6)},
                        {"tool", kNoText},
+                       {"wear", no_number(kSharp, kBluntest)},
+                       {"law", kNoText},
                        {"trouble", kNoText}},
                       output_refusal);
 }
@@ -206,6 +230,7 @@ TEST(PointerMessage, TheEndsOfARangeAreTaken) {
       input.spindle = spindle;
       input.target_mm = {1e5, -1e5, 1e5};
       input.spindle_rpm = 2e5;
+      input.wear = spindle > 0.0 ? kBluntest : kSharp;
       const auto read = read_pointer_input(encode(input));
       ASSERT_TRUE(read) << read.error().message;
       EXPECT_EQ(*read, input);
@@ -266,7 +291,7 @@ TEST(PointerMessage, ALongTextArrivesShortened) {
   ASSERT_TRUE(read) << read.error().message;
   // 512 bytes would end within a character of two.
   EXPECT_EQ(read->trouble, output.trouble.substr(0, 511));
-  output.tool = output.trouble = std::string(512, '\x01');
+  output.tool = output.law = output.trouble = std::string(512, '\x01');
   const auto escaped = read_pointer_output(encode(output));
   ASSERT_TRUE(escaped) << escaped.error().message;
   expect_same(*escaped, output);

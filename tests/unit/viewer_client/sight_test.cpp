@@ -174,6 +174,18 @@ TEST_F(OnBall, TheWheelSetsThePushWithinItsBounds) {
   EXPECT_DOUBLE_EQ(pointer_.push_n(), 1.0);
 }
 
+TEST_F(OnBall, AnotherToolHasItsOwnSpeedWearAndLaw) {
+  pointer_.take("drill-3.2");
+  pointer_.set_spindle_speed(700.0);
+  pointer_.set_edge(2.5, "allotta");
+  EXPECT_EQ(pointer_.input().wear, 2.5);
+  EXPECT_EQ(pointer_.input().law, "allotta");
+  pointer_.take("burr-round-5");
+  EXPECT_EQ(pointer_.input().spindle_rpm, 0.0);
+  EXPECT_FALSE(pointer_.input().wear);
+  EXPECT_EQ(pointer_.input().law, "");
+}
+
 TEST_F(OnBall, TurningTiltsTheToolAndRollingKeepsItsAxis) {
   over(Vec3(0, -10, 0));
   const Vec3 straight = axis();

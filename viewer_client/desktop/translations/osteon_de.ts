@@ -214,6 +214,41 @@
     </message>
 </context>
 <context>
+    <name>Force</name>
+    <message>
+        <source>&amp;Proportional</source>
+        <translation>&amp;Proportionale Kraft</translation>
+    </message>
+    <message>
+        <source>All ratios of forces stay. A weak device hides weak forces.</source>
+        <translation>Alle Verhältnisse der Kräfte bleiben. Ein schwaches Gerät verbirgt schwache Kräfte.</translation>
+    </message>
+    <message>
+        <source>&amp;Compressed</source>
+        <translation>&amp;Komprimierte Kraft</translation>
+    </message>
+    <message>
+        <source>&amp;Feed cue</source>
+        <translation>&amp;Vibration nach dem Vorschub</translation>
+    </message>
+    <message>
+        <source>A small force, and a vibration that grows with the feed.</source>
+        <translation>Eine kleine Kraft und eine Vibration, die mit dem Vorschub wächst.</translation>
+    </message>
+    <message>
+        <source>A logarithm: weak forces keep their ratios, strong ones come closer to each other.</source>
+        <translation>Logarithmus: Schwache Kräfte behalten ihr Verhältnis, starke rücken zusammen.</translation>
+    </message>
+    <message>
+        <source>The window&apos;s haptic client starts again: the tool leaves the bone for seconds.</source>
+        <translation>Das Haptikprogramm startet neu: Das Werkzeug verlässt für Sekunden den Knochen.</translation>
+    </message>
+    <message>
+        <source>Other haptic clients have the option --force-choice.</source>
+        <translation>Andere Haptikprogramme haben die Option --force-choice.</translation>
+    </message>
+</context>
+<context>
     <name>GaugesPanel</name>
     <message>
         <source>Push</source>
@@ -298,6 +333,18 @@
     <message>
         <source>%1 %</source>
         <translation>%1 %</translation>
+    </message>
+    <message>
+        <source>Wear</source>
+        <translation>Verschleiß</translation>
+    </message>
+    <message>
+        <source>Temperature</source>
+        <translation>Temperatur</translation>
+    </message>
+    <message>
+        <source>not simulated</source>
+        <translation>nicht simuliert</translation>
     </message>
 </context>
 <context>
@@ -875,6 +922,18 @@
         <source>The unpacked copy of %1 was damaged and is removed. Open the file again.</source>
         <translation>Die entpackte Kopie von %1 war beschädigt und ist entfernt. Die Datei neu öffnen.</translation>
     </message>
+    <message>
+        <source>Force on the hand</source>
+        <translation>Kraft auf die Hand</translation>
+    </message>
+    <message>
+        <source>The next practice room begins with it.</source>
+        <translation>Der nächste Übungsraum beginnt damit.</translation>
+    </message>
+    <message>
+        <source>The haptic client starts again with it.</source>
+        <translation>Das Haptikprogramm startet damit neu.</translation>
+    </message>
 </context>
 <context>
     <name>PadHand</name>
@@ -971,6 +1030,26 @@
     <message>
         <source>%1 mm</source>
         <translation>%1 mm</translation>
+    </message>
+    <message>
+        <source>Wear</source>
+        <translation>Verschleiß</translation>
+    </message>
+    <message>
+        <source>Force law</source>
+        <translation>Kraftgesetz</translation>
+    </message>
+    <message>
+        <source>The law &quot;%1&quot; in the list of osteon-haptic laws</source>
+        <translation>Das Gesetz &quot;%1&quot; in der Liste von osteon-haptic laws</translation>
+    </message>
+    <message>
+        <source>1 is sharp, 2 is blunt. A change acts at once, also while the tool cuts.</source>
+        <translation>1 ist scharf, 2 ist stumpf. Eine Änderung wirkt sofort, auch beim Schneiden.</translation>
+    </message>
+    <message>
+        <source>Cutting blunts the tool further. The gauge shows how blunt it is.</source>
+        <translation>Schneiden macht das Werkzeug stumpfer. Die Anzeige sagt, wie stumpf es ist.</translation>
     </message>
 </context>
 <context>
@@ -1362,6 +1441,42 @@
     <message>
         <source>Screws</source>
         <translation>Schrauben</translation>
+    </message>
+    <message>
+        <source>Measured thrust</source>
+        <translation>Gemessene Vorschubkraft</translation>
+    </message>
+    <message>
+        <source>Energy of the removed volume</source>
+        <translation>Energie des entfernten Volumens</translation>
+    </message>
+    <message>
+        <source>Erosion</source>
+        <translation>Abtrag</translation>
+    </message>
+    <message>
+        <source>Milling</source>
+        <translation>Fräsen</translation>
+    </message>
+    <message>
+        <source>Spring and damper</source>
+        <translation>Feder und Dämpfer</translation>
+    </message>
+    <message>
+        <source>Sum over contact points</source>
+        <translation>Summe über Kontaktpunkte</translation>
+    </message>
+    <message>
+        <source>Single teeth of a saw</source>
+        <translation>Einzelne Zähne einer Säge</translation>
+    </message>
+    <message>
+        <source>Reaming</source>
+        <translation>Aufreiben</translation>
+    </message>
+    <message>
+        <source>Blows of a mallet</source>
+        <translation>Schläge eines Hammers</translation>
     </message>
 </context>
 <context>

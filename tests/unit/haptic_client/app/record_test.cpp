@@ -72,6 +72,8 @@ TickRow row(std::uint64_t i) {
   row.report.cutting.phase = i % 2 ? CuttingPhase::cutting : CuttingPhase::free;
   row.report.cutting.out_of_range = static_cast<unsigned>(i % 64);
   row.report.tool = static_cast<int>(i / 700 % 2);
+  row.report.cutting.wear = 1.0 + static_cast<double>(i) / 1024.0;
+  if (i >= 900) row.report.cutting.law = find_force_law(i < 1000 ? "milling" : "multi-point");  // chosen meanwhile
   row.reading.pose_device_tool = pose(random);
   row.reading.buttons = static_cast<std::uint32_t>(i % 4);
   row.reading.pedal = random.between(0, 1);
@@ -331,8 +333,11 @@ for name in "spindle_rpm feed density law state tool force_scale torque".split()
 assert h5py.check_enum_dtype(f["data/state"].dtype)["cutting"] == f["data/state"][1]
 assert np.allclose(np.diff(f["data/time"][:]), 1e-3, atol=2e-6) and f["data/time"][0] > 1.7e9
 assert [t.decode() for t in f["metadata/tools"][:]] == ["drill-3.2", "burr-round-5"]
-assert [t.decode() for t in f["metadata/laws"][:]] == ["chi", "milling"]
-assert f["data/law"][699] == 0 and f["data/law"][700] == 1 and f["burr_change/burr_size"][:].tolist() == [3.2, 5.0]
+laws = [t.decode() for t in f["metadata/laws"][:]]
+assert laws[:2] == ["chi", "milling"] and len(laws) == len(set(laws)), laws
+assert [laws[i] for i in f["data/law"][[699, 700, 999, 1000]]] == ["chi", "milling", "milling", "multi-point"]
+assert (f["data/wear"][:] == 1 + np.arange(1300) / 1024).all()
+assert f["burr_change/burr_size"][:].tolist() == [3.2, 5.0]
 assert (f["data/law_out_of_range"][:] == np.arange(1300) % 64).all()
 bits = [t.decode() for t in f["metadata/range_bits"][:]]
 assert bits == ["speed", "feed", "density", "diameter", "depth of cut", "speed of the teeth"], bits
@@ -475,6 +480,13 @@ TEST(RangeWatch, ReportsEachLawOnce) {
   EXPECT_EQ(uses[0].ticks, 1500u);
   EXPECT_EQ(out_of_range_words(uses[0].bits), "feed, density");
   EXPECT_EQ(uses[1].ticks, 300u);
+  // A law that was chosen while the session runs counts by itself.
+  LoopReport chosen;
+  chosen.cutting.law = find_force_law("allotta");
+  chosen.cutting.out_of_range = static_cast<unsigned>(OutOfRange::density);
+  EXPECT_EQ(ticks.watch.note(drill, chosen), "");
+  ASSERT_EQ(ticks.watch.uses().size(), 3u);
+  EXPECT_EQ(ticks.watch.uses()[2].law->name, "allotta");
 }
 
 // A cone that enters is outside for less than 0.2 s. Nothing is reported, however many holes follow, but each tick is

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <functional>
 
+#include "common/mechanics/force_law.hpp"
 #include "haptic_client/app/record_file.hpp"
 #include "haptic_client/device/recorded_device.hpp"
 #include "haptic_client/simulation/played_pointer.hpp"
@@ -132,7 +133,8 @@ ReadyPlan pointed(const Case& bone) {
   return *plan;
 }
 
-// It rests, drills, takes the bur, burrs while it moves, and leaves the bone.
+// It rests, drills, makes the drill blunt and chooses another law for it, takes the bur, burrs while it moves, and
+// leaves the bone.
 Session record_pointer(const Case& bone, const std::filesystem::path& file) {
   PointerExchange exchange;
   const SimulatedDeviceParams device{"pointer", SimulatedDeviceParams{}.limits};
@@ -162,6 +164,9 @@ Session record_pointer(const Case& bone, const std::filesystem::path& file) {
       if (i % 50 == 0) {
         command.tool = act.tool;
         command.push = act.push;
+        const bool changed = act.tool == 0 && act.push && i >= 1000;
+        command.wear = changed ? 2.0 : 0.0;
+        command.law = changed ? find_force_law("allotta") : nullptr;
         command.target_mm = act.push ? command.target_mm + 0.03 * (act.to_mm - command.target_mm) : act.to_mm;
         ++command.number;
         exchange.commands.store(command);

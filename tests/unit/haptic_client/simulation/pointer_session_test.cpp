@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <numbers>
 #include <random>
 #include <string_view>
 
@@ -22,8 +23,9 @@ const Vec3 kAt_mm(0.1, -0.2, 0.0);
 
 class PointedHand : public ::testing::Test {
  protected:
-  void begin(const char* tool = "drill-3.2") {
-    auto session = std::make_unique<PointerSession>(plan(), exchange_, SimulatedDeviceParams{}, 0.0);
+  void begin(const char* tool = "drill-3.2", ForceChoice choice = ForceChoice::proportional) {
+    auto session =
+        std::make_unique<PointerSession>(plan(), exchange_, SimulatedDeviceParams{}, ForceScaling(0.0, choice));
     session_ = session.get();
     bench_ = std::make_unique<Bench>(bone_, std::move(session));
     command_ = {};
@@ -450,13 +452,116 @@ TEST_F(PointedHand, AnotherToolComesIntoTheHand) {
   EXPECT_EQ(last.commanded_rpm, 33.0);
 }
 
+// Feed at which the hand's push and the drill's thrust are equal, by the laws as published: Chi (7.3) or Allotta
+// (7.1), each with wear in proportion. At a feed v the hand gives F - (B + K · 0.3 s) v.
+double steady_feed_mm_per_s(bool chi, double wear, double rpm, double push_n) {
+  const HandParams hand = expert_hand();
+  const auto excess_n = [&](double v) {
+    const double chi_n = 134.6 * std::pow(rpm, -0.3327) * std::pow(v, 0.5189) * std::pow(1.9, 1.1841);
+    const double allotta_n = 5.0 * 130.0 * (60.0 * v / rpm) * 1.6 * std::sin(0.5 * 118.0 * std::numbers::pi / 180.0);
+    return wear * (chi ? chi_n : allotta_n) + (hand.damping_n_s_per_mm + hand.stiffness_n_per_mm * hand.follow_s) * v -
+           push_n;
+  };
+  double low = 0.0, high = 10.0;
+  for (int i = 0; i < 60; ++i) (excess_n(0.5 * (low + high)) < 0.0 ? low : high) = 0.5 * (low + high);
+  return low;
+}
+
+// What the message says of the tool's edge acts in the bone, in the middle of a push.
+TEST_F(PointedHand, WearAndLawOfAMessageActWhileTheToolCuts) {
+  begin();
+  run(1500);
+  press(1900);
+  ASSERT_GT(depth(run(1)), 1.1) << "the cone is in the cortex";
+  const auto expect_feed = [&](bool chi, double wear, int ticks) {
+    run(500);  // the hand comes to its new balance
+    const double from_mm = depth(run(1));
+    double rpm = 0.0;
+    const double to_mm = depth(run(ticks, [&](const SessionTick& now) { rpm += now.report.spindle_rpm / ticks; }));
+    ASSERT_EQ(phase(), PointerPhase::pushes);
+    ASSERT_LT(to_mm, 4.9) << "the cortex has ended";
+    const double feed = (to_mm - from_mm) / (1e-3 * ticks), expected = steady_feed_mm_per_s(chi, wear, rpm, 29.0);
+    std::printf("  %s, wear %.0f: %.3f mm/s, by hand %.3f mm/s\n", chi ? "Chi" : "Allotta", wear, feed, expected);
+    EXPECT_NEAR(feed, expected, 0.06 * expected);
+    ASSERT_TRUE(exchange_.states.refresh());
+    EXPECT_NEAR(exchange_.states.value().wear, wear, 0.01);
+    EXPECT_EQ(exchange_.states.value().law->name, chi ? "chi" : "allotta");
+  };
+  expect_feed(true, 1.0, 500);
+  command_.wear = 2.0;
+  expect_feed(true, 2.0, 1000);
+  command_.law = find_force_law("allotta");
+  expect_feed(false, 2.0, 1000);
+  command_.wear = 1.0;
+  expect_feed(false, 1.0, 500);
+}
+
+// Each tool has its own edge. A message that comes again does not sharpen a tool that work has blunted.
+TEST_F(PointedHand, TheEdgeIsOfTheToolThatTheMessageNames) {
+  const auto state = [&] {
+    exchange_.states.refresh();
+    return exchange_.states.value();
+  };
+  begin();
+  const int drill = command_.tool;
+  command_.wear = 1.5;
+  command_.law = find_force_law("multi-point");
+  run(1500);
+  press(3000);
+  EXPECT_GT(state().wear, 1.5);
+  let_go(3000);
+  const double worn = state().wear;
+  EXPECT_LT(worn, 1.51);
+  command_.tool = tool_named("burr-round-5");
+  command_.wear = 0.0;
+  command_.law = nullptr;
+  run(1500);
+  ASSERT_EQ(state().tool, command_.tool);
+  EXPECT_EQ(state().wear, 1.0);
+  EXPECT_EQ(state().law->name, "milling");
+  // Without a word the drill is as blunt as it was, and has its own law.
+  command_.tool = drill;
+  run(1500);
+  EXPECT_EQ(state().wear, worn);
+  EXPECT_EQ(state().law->name, "chi");
+}
+
+// The hand gets the logarithm of what the bone gives, and with the feed cue within a smaller budget.
+TEST_F(PointedHand, GetsTheForceAsItIsChosen) {
+  for (const ForceChoice choice : {ForceChoice::proportional, ForceChoice::compressed, ForceChoice::feed_cue}) {
+    SCOPED_TRACE(name(choice));
+    begin("drill-3.2", choice);
+    run(1500);
+    press(3000);
+    double bone_n = 0.0, hand_n = 0.0;
+    constexpr int kTicks = 500;
+    press(kTicks, [&](const SessionTick&) {
+      ASSERT_TRUE(exchange_.states.refresh());
+      bone_n += exchange_.states.value().force_bone_n.norm() / kTicks;
+      hand_n += exchange_.states.value().force_hand_n.dot(-Vec3::UnitZ()) / kTicks;
+    });
+    ASSERT_EQ(phase(), PointerPhase::pushes);
+    ASSERT_GT(bone_n, 20.0);
+    // 60 N become the device's 30 N, or 0.3 of them: F0 ln(1 + 60 N / F0) is 30 N for F0 = 23.88 N, and s is 1.
+    // 9 N are reached with F0 = 3 N and s = 0.985.
+    const double expected_n = choice == ForceChoice::proportional ? bone_n
+                              : choice == ForceChoice::compressed ? 23.88 * std::log1p(bone_n / 23.88)
+                                                                  : 0.985 * 3.0 * std::log1p(bone_n / 3.0);
+    std::printf("  bone %.2f N, hand %.2f N, by hand %.2f N\n", bone_n, hand_n, expected_n);
+    // The motor's drag and the cue have no mean along the axis.
+    EXPECT_NEAR(hand_n, expected_n, 0.05 * expected_n);
+    let_go(10);
+  }
+}
+
 TEST_F(PointedHand, DoesNotAllocate) {
   begin();
   std::int64_t allocations = 0;
   int pushed = 0;
   for (int i = 0; i < 6000; ++i) {
     command_.push = i > 1000 && i < 4000;
-    if (i == 4800) command_.tool = tool_named("burr-round-5");
+    if (i == 2500) command_.wear = 2.0, command_.law = find_force_law("allotta");
+    if (i == 4800) command_.wear = 0.0, command_.law = nullptr, command_.tool = tool_named("burr-round-5");
     if (i == 5400) command_.target_mm = kAt_mm + Vec3(0, 0, kThickness_mm), command_.rotation = along(-Vec3::UnitZ());
     if (i % 50 == 0) send();
     const osteon::test::AllocationCounter heap;
@@ -504,8 +609,8 @@ struct GivenEnergy {
   bool open_ = false;
 };
 
-// What a pointer may do at its worst: it jumps to any side, is silent for up to two seconds, pushes with any force and
-// changes tools. The machine misses ticks.
+// What a pointer may do at its worst: it jumps to any side, is silent for up to two seconds, pushes with any force, and
+// changes tools, their wear and their laws. The machine misses ticks.
 class WildPointer {
  public:
   explicit WildPointer(unsigned seed) : random_(seed) {}
@@ -527,8 +632,15 @@ class WildPointer {
     command.push_n = uniform(1, 40);
     command.spindle = maybe(0.8) ? 1.0 : maybe(0.5) ? uniform(0, 1) : 0.0;
     if (maybe(0.05)) command.tool = static_cast<int>(uniform(0, tools));
+    command.wear = maybe(0.3) ? uniform(1, 5) : 0.0;
     next_ = tick + static_cast<int>(maybe(0.1) ? uniform(300, 2000) : uniform(1, 300));
     return true;
+  }
+  // One that fits, or null.
+  const ForceLaw* law_for(const Tool& tool) {
+    const auto laws = force_laws();
+    const ForceLaw& any = laws[static_cast<std::size_t>(uniform(0, static_cast<double>(laws.size())))];
+    return any.fits(tool.kind) ? &any : nullptr;
   }
   int periods() { return maybe(0.002) ? static_cast<int>(uniform(2, 30)) : 1; }
   bool maybe(double share) { return uniform(0, 1) < share; }
@@ -552,7 +664,10 @@ TEST_F(PointedHand, StaysPassiveUnderJumpsStallsAndRandomPushes) {
     GivenEnergy given;
     const int tools = static_cast<int>(plan().tools.size());
     for (int i = 0; i < kTicks; ++i) {
-      if (wild.change(command_, i, tools)) send();
+      if (wild.change(command_, i, tools)) {
+        command_.law = wild.law_for(plan().tools[static_cast<std::size_t>(command_.tool)].tool);
+        send();
+      }
       const SessionTick now = bench_->tick(wild.periods());
       bench_->follow();
       const double force_n = now.report.device.force_n.norm();

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <memory>
 #include <numbers>
+#include <utility>
 #include <vector>
 
 #include "common/volume/replica.hpp"
@@ -75,6 +76,8 @@ class Rig {
   }
   void spindle(double rpm) { input_.spindle_rpm = rpm; }
   void irrigate(bool on) { input_.irrigation = on; }
+  void set_wear(double wear) { loop_.set_wear(0, wear); }
+  void set_law(const char* law) { loop_.set_law(0, *find_force_law(law)); }
 
  private:
   static std::vector<ToolModel> models(const Tool& tool, double pitch_mm, const char* law, double wear) {
@@ -141,6 +144,97 @@ TEST(ToolEffects, AToolResistsByTheLawThatIsChosen) {
     // The spindle droops by some percent under the load.
     EXPECT_NEAR(mean.force_n, chosen.newtons, 0.05 * chosen.newtons) << (chosen.law ? chosen.law : "default");
   }
+}
+
+// What hand and cutting got from the coupling, minus what the hand put in, from forces and the handle's path alone.
+// Nothing is scaled.
+class GivenEnergy {
+ public:
+  void see(const LoopReport& now) {
+    given_mj_ += shown_n_.dot(now.pose_bone_device.position_mm - handle_mm_) + now.cutting.work_mj;
+    most_mj_ = std::max(most_mj_, given_mj_);
+    shown_n_ = now.coupling.device_n;
+    handle_mm_ = now.pose_bone_device.position_mm;
+  }
+  [[nodiscard]] double most_mj() const { return most_mj_; }
+
+ private:
+  Vec3 shown_n_ = Vec3::Zero(), handle_mm_ = Vec3::Zero();
+  double given_mj_ = 0, most_mj_ = 0;
+};
+
+// A drill is fed at 1 mm/s, and its edge changes in the bone. Wear enters Chi's thrust in proportion, and the thrust is
+// as N^-0.3327: a spindle that droops more has a little more. Another law has its own thrust. The spring's force grows
+// no faster than the hand stretches it: K v in a second.
+TEST(ToolEffects, AnEdgeThatChangesInTheBoneHasItsOwnThrustAndNoJump) {
+  LoopParams params;
+  params.peak_n = 200.0;
+  Rig rig(slab(22.0, 1.9), *find_tool("drill-3.2"), params);
+  rig.irrigate(true);  // clogged flutes would add to the thrust
+  GivenEnergy given;
+  double before_n = 0.0, most_rise_n = 0.0, shown_n = 0.0, most_shown_n = 0.0;
+  // Drills on, and returns thrust and speed of the last second. By then the spring has settled.
+  const auto drill_on = [&](double seconds) {
+    Mean mean;
+    double rpm = 0.0;
+    const auto reports = rig.move({0, 0, seconds}, seconds);
+    for (const LoopReport& r : reports) {
+      given.see(r);
+      most_rise_n =
+          std::max(most_rise_n, r.coupling.force_n.norm() - std::exchange(before_n, r.coupling.force_n.norm()));
+      most_shown_n =
+          std::max(most_shown_n, r.coupling.device_n.norm() - std::exchange(shown_n, r.coupling.device_n.norm()));
+      EXPECT_LE(r.coupling.energy.worst_mj, 0.01);
+    }
+    for (std::size_t i = reports.size() - 1000; i < reports.size(); ++i) {
+      mean.force_n += 1e-3 * reports[i].cutting.force_n.norm();
+      rpm += 1e-3 * reports[i].spindle_rpm;
+    }
+    return std::pair(mean.force_n, rpm);
+  };
+  const auto [sharp_n, sharp_rpm] = drill_on(5.0);
+  most_rise_n = most_shown_n = 0.0;  // of the entry
+  rig.set_wear(2.0);
+  const auto [blunt_n, blunt_rpm] = drill_on(5.0);
+  rig.set_wear(1.0);
+  const auto [again_n, again_rpm] = drill_on(4.0);
+  rig.set_law("allotta");
+  const auto [allotta_n, allotta_rpm] = drill_on(6.0);
+  const double droop = std::pow(blunt_rpm / sharp_rpm, -0.3327);
+  std::printf(
+      "  thrust: %.2f N sharp, %.2f N at wear 2, %.2f N sharp again, %.2f N by Allotta's law; a tick's rise at "
+      "most %.4f N, shown %.4f N; given %.4f mJ\n",
+      sharp_n, blunt_n, again_n, allotta_n, most_rise_n, most_shown_n, given.most_mj());
+  EXPECT_NEAR(sharp_n, 28.9, 0.03 * 28.9);
+  EXPECT_NEAR(blunt_n / sharp_n, 2.0 * droop, 0.01);
+  EXPECT_NEAR(again_n / sharp_n, 1.0, 0.01);
+  EXPECT_NEAR(allotta_n, 53.49 * 1000.0 / allotta_rpm, 0.01 * 53.49);  // goes with the feed in a turn
+  EXPECT_LE(most_rise_n, params.stiffness_n_per_mm * 1.0 * params.dt_s + 1e-6);
+  // Damping and the filter's lag add to that, each by a few times as much.
+  EXPECT_LE(most_shown_n, 0.3);
+  EXPECT_LE(given.most_mj(), 0.01);
+}
+
+// The work of cutting blunts a tool further from where it was set. Clogging and the like stay as they were.
+TEST(ToolEffects, ReportsSayHowBluntTheToolIsAndByWhichLawItCuts) {
+  Rig rig(slab(12.0, 1.9), *find_tool("drill-3.2"));
+  EXPECT_EQ(rig.tick().cutting.wear, 1.0);
+  EXPECT_EQ(rig.tick().cutting.law, find_force_law("chi"));
+  rig.set_wear(1.5);
+  rig.set_law("spring-damper");
+  const LoopReport set = rig.tick();
+  EXPECT_EQ(set.cutting.wear, 1.5);
+  EXPECT_EQ(set.cutting.law, find_force_law("spring-damper"));
+  rig.irrigate(false);
+  const auto reports = rig.move({0, 0, 6.0}, 6.0);
+  EXPECT_GT(reports.back().cutting.wear, 1.5);
+  EXPECT_LT(reports.back().cutting.wear, 1.51);
+  const double full = reports.back().cutting.flutes_full;
+  ASSERT_GT(full, 0.1);
+  rig.set_wear(3.0);
+  EXPECT_NEAR(rig.tick().cutting.flutes_full, full, 1e-3);
+  // Blunter than cutting alone can make it: it stays so.
+  EXPECT_EQ(rig.move({0, 0, 1.0}, 1.0).back().cutting.wear, 3.0);
 }
 
 // Chi's law was made for 0.3 to 2.0 g/cm3 and 0.5 to 3 mm/s. Every cutting tick says which limits it exceeds. Other
