@@ -17,8 +17,8 @@
 namespace osteon {
 
 inline constexpr int kLinkVersion = 3;
-// Bytes. Of control characters, of six bytes each in JSON, two texts with a wave, or three, fit into a message beside
-// all numbers.
+// Bytes. JSON writes a control character with six bytes. Even so, a message has room for three such texts beside all
+// numbers, or for two and a wave.
 inline constexpr std::size_t kMostLinkText = 512;
 
 // What errors call the message and its two programs: "a pointer's", "the pointer", "osteon and osteon-haptic".

@@ -41,8 +41,8 @@ struct PointerInput {
   double spindle_rpm = 0.0;  // its full speed; 0: the tool's own
   std::string tool{};        // that the hand is to hold; empty: no change
   bool empty_hand = false;   // the hand holds no tool, and nobody sees one; off in a message without this field
-  // How blunt that tool is made, kSharp to kBluntest. It acts when it changes, and cutting blunts the tool further.
-  // None, as in a message without this field: the tool stays as it is.
+  // The wear that the tool gets, kSharp to kBluntest. It acts only when it changes. Cutting then blunts the tool
+  // further. None, as in a message without this field: the tool keeps its wear.
   std::optional<double> wear{};
   std::string law{};  // the force law of that tool; empty, or without this field: the one it began with
   PointerSource source = PointerSource::mouse;

@@ -35,7 +35,7 @@ struct Probe {
 };
 
 // `host`: a name or an address, without brackets. Takes at most `patience`, whatever the other end does. Checks the
-// server's certificate before it shows the client's. `stop` is asked while it waits. True: nothing more is waited for.
+// server's certificate before it shows the client's. It asks `stop` while it waits. After true it waits no longer.
 [[nodiscard]] Probe probe_tls(const std::string& host, const std::string& port, const ProbeFiles& files,
                               std::chrono::milliseconds patience, const std::function<bool()>& stop = {});
 

@@ -46,7 +46,7 @@ pkg_check_modules(kissfft REQUIRED IMPORTED_TARGET kissfft-float)
 list(APPEND CMAKE_MODULE_PATH /usr/lib/${CMAKE_LIBRARY_ARCHITECTURE}/cmake/OpenVDB)
 find_package(OpenVDB 10 REQUIRED)
 # The loader looks for each of OpenVDB's 69 000 names in one library after the other, in the order of linking. So
-# OpenVDB comes first. A sanitizer's own library must come first.
+# OpenVDB comes first, except in a build with a sanitizer, whose own library must come first.
 if(NOT OSTEON_SANITIZE)
   target_link_options(osteon_flags INTERFACE
     "SHELL:-Wl,--push-state,--as-needed $<TARGET_FILE:OpenVDB::openvdb> -Wl,--pop-state")

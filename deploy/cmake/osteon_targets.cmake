@@ -113,8 +113,8 @@ function(osteon_test_suites suites)
 endfunction()
 
 # A GoogleTest program. Each of its suites is registered with ctest: a process for each case would take longer to load
-# libraries than to test. LABELS name the kind of test. deploy/nightly builds NIGHTLY
-# tests with the target nightly_tests and runs them with `ctest -C nightly`. deploy/test does neither.
+# libraries than to test. LABELS name the kind of test. deploy/nightly builds NIGHTLY tests with the target
+# nightly_tests and runs them with `ctest -C nightly`. deploy/test neither builds nor runs them.
 function(osteon_test name)
   cmake_parse_arguments(arg "NIGHTLY" "TIMEOUT" "SOURCES;DEPS;LABELS" ${ARGN})
   add_executable(${name} ${arg_SOURCES})

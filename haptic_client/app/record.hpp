@@ -38,7 +38,7 @@ struct RecordedCut {
 };
 
 [[nodiscard]] const char* name(CuttingPhase phase);
-// Name of the law by which a tool cuts, as it began.
+// Name of the law with which a tool began.
 [[nodiscard]] std::string law_name(const ToolModel& model);
 // Names of the bits of LoopReport::events, the lowest first.
 [[nodiscard]] std::vector<std::string> event_names();

@@ -59,7 +59,8 @@ class ToolOperator {
   Result<ReadyPlan> pointed_ready_on(const Case& bone, const ToolBox& tools) const;
   // The session of a person with a pointer.
   Result<std::unique_ptr<Session>> pointed_on(const Case& bone, const ToolBox& tools, const ForceScaling& scaling);
-  // Checks that a recording suits the bone and the plan. Returns how force was scaled then, unless options say more.
+  // Checks that a recording suits the bone and the plan. Returns how it scaled force. An option for the scale counts
+  // more.
   Result<ForceScaling> played_on(const Case& bone, const ReadyPlan& ready, ForceScaling scaling) const;
   // Opens a person's devices.
   Result<void> connect(const DeviceNotice& notice);

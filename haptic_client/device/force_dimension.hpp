@@ -14,7 +14,7 @@ struct ForceDimensionOptions {
   std::filesystem::path library;           // empty: libdhd.so, searched by the dynamic linker
   int number = 0;                          // among the connected devices
   std::chrono::microseconds period{1000};  // of its thread; 0: as fast as the device answers
-  // How long a force lasts that is not written again. Only a test that simulates time needs more.
+  // How long the force that was written last lasts. Only a test that simulates time needs more.
   std::chrono::milliseconds force_held = DeviceExchange::kForceHeld;
 };
 

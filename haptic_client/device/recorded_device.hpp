@@ -60,8 +60,8 @@ struct RecordedSession {
 
 // Reads a recording, as far as it is complete. It may still be growing, or its writer may have been killed. Errors:
 // not_found (no such file), invalid_input (no HDF5 file, no recording, a dataset missing or of the wrong kind, no row,
-// a value that is not a number), unsupported (another version of the format; a pointer's recording of before, or one
-// that lacks ticks, which does not hold what its playback needs).
+// a value that is not a number), unsupported (another version of the format; a pointer's recording that lacks ticks, or
+// that is older than recording::kPointerSource).
 [[nodiscard]] Result<RecordedSession> read_recording(const std::filesystem::path& file);
 
 class RecordedDevice final : public HapticDevice {
@@ -85,7 +85,7 @@ class RecordedDevice final : public HapticDevice {
   std::string name_;
   RecordedSession session_;
   std::size_t next_ = 0;  // haptic thread
-  bool ended_ = false;    // haptic thread; read() has given more than there is
+  bool ended_ = false;    // haptic thread; read() was called after the last reading
 };
 
 // Whether the room's bone is as it was when the recording began. On other bone, the recorded handle moves through air

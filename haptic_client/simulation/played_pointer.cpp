@@ -28,8 +28,9 @@ void PlayedPointerSession::take_up(const RecordedTakeUp& taken, SurgeonOrder& or
   order.take_up = true;
 }
 
-// The person may have changed both in any tick. Cutting blunts the tool again as it did, so this is no change then.
-void PlayedPointerSession::take_edge(const PointerTick& now) noexcept {
+// The person may have changed both in any tick. Where nobody did, cutting has blunted the tool as in the recording, so
+// the values stay the same.
+void PlayedPointerSession::take_wear_and_law(const PointerTick& now) noexcept {
   loop_.set_wear(tool_, now.wear);
   if (const ForceLaw* law = laws_[now.law]) loop_.set_law(tool_, *law);
 }
@@ -42,7 +43,7 @@ SessionTick PlayedPointerSession::tick(const Patch& patch, RoomLink room, int pe
   const PointerTick* now = device_.pointer_tick();
   if (now && now->take_up >= 0)
     take_up(device_.session().take_ups[static_cast<std::size_t>(now->take_up)], result.order);
-  if (now) take_edge(*now);
+  if (now) take_wear_and_law(*now);
   const bool in_hand = now && now->in_hand;
   LoopInput input;
   input.pose_device_tool = reading.pose_device_tool;

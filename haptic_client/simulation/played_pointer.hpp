@@ -1,5 +1,5 @@
-// A pointer's hand that a recording leads. The simulated hand is in the recording: each tick has the pose of the
-// handle, and each take-up of a tool its mapping. So the loop gets the same inputs again, whatever the pointer did.
+// Plays the recording of a pointer's hand. Each tick of the recording has the pose of the handle, and each take-up of a
+// tool has its mapping. So the loop gets the same inputs again, and no hand is simulated.
 #pragma once
 #include <vector>
 
@@ -30,7 +30,7 @@ class PlayedPointerSession final : public Session {
 
  private:
   void take_up(const RecordedTakeUp& taken, SurgeonOrder& order) noexcept;
-  void take_edge(const PointerTick& now) noexcept;  // wear and law of the tool in hand
+  void take_wear_and_law(const PointerTick& now) noexcept;  // wear and law of the tool in hand
 
   ReadyPlan plan_;
   RecordedDevice& device_;

@@ -93,12 +93,12 @@ void PointerSession::read_pointer() noexcept {
   ticks_since_message_ = command_.number != before ? 0 : std::min(ticks_since_message_ + 1, kSilentTicks + 1);
   command_.tool = std::clamp(command_.tool, 0, static_cast<int>(plan_.tools.size()) - 1);
   if (!command_.push) let_go_ = true;
-  take_edge();
+  take_wear_and_law();
 }
 
-void PointerSession::take_edge() noexcept {
+void PointerSession::take_wear_and_law() noexcept {
   const auto tool = static_cast<std::size_t>(command_.tool);
-  // The window repeats its message. A tool must not be sharpened by that.
+  // The window repeats its message, and that must not sharpen the tool.
   if (command_.wear > 0.0 && command_.wear != worn_[tool]) {
     loop_.set_wear(command_.tool, command_.wear);
     worn_[tool] = command_.wear;

@@ -92,7 +92,7 @@ class PointerSession final : public Session {
  private:
   [[nodiscard]] bool silent() const noexcept { return ticks_since_message_ > kSilentTicks; }
   void read_pointer() noexcept;
-  void take_edge() noexcept;  // wear and law of the tool that the pointer wants
+  void take_wear_and_law() noexcept;  // wear and law of the tool that the pointer wants
   void act(const Patch& patch, double dt_s, SurgeonOrder& order) noexcept;
   void take_up(SurgeonOrder& order) noexcept;  // above the pointer's target
   // Brings the tip to its rest above the pointer's target, or as close to it as the tool stays clear of the bone. True:

@@ -153,8 +153,8 @@ Result<void> check_no_case_file(const std::string& input) {
   std::string head(kNameAt + kFirst.size(), '\0');
   std::ifstream(input, std::ios::binary).read(head.data(), static_cast<std::streamsize>(head.size()));
   if (!head.starts_with(kBegin) || !head.ends_with(kFirst)) return {};
-  return bad_input(input + " is a case in one file and no scan; make its folder first with: osteon-import unpack " +
-                   input + " --out FOLDER");
+  return bad_input(input + " is a case file, not a scan; unpack it first with: osteon-import unpack " + input +
+                   " --out FOLDER");
 }
 
 std::string_view name_of_one_scan(const std::string& input, const KeepGoing& keep_going) {

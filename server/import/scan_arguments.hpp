@@ -31,7 +31,7 @@ void add_scan_options(CLI::App& command, ScanArguments& arguments, const std::st
 // input's content decides. Errors: those of the readers, and invalid_input for options that do not fit.
 [[nodiscard]] Result<CtScan> read_scan(const ScanArguments& arguments, const KeepGoing& reading);
 
-// Error invalid_input: the input is a case in one file, which has to be unpacked first. The error says how.
+// Error invalid_input: the input is a case file, which must be unpacked first. The error says how.
 [[nodiscard]] Result<void> check_no_case_file(const std::string& input);
 
 // What an input is that has one scan and no series; empty for others.

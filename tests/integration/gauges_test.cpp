@@ -1,5 +1,5 @@
-// The gauges of the window: when the plot is drawn, and what the devices of others hold. And the tool dialog, whose
-// choices the gauges show.
+// The gauges of the window: when the plot is drawn, and what the devices of others hold. And the panel Tool,
+// whose choices the gauges show.
 #include <gtest/gtest.h>
 
 #include <QAction>
@@ -74,11 +74,11 @@ TEST(HandForce, IsThePointersElseThatOfTheStatesDevice) {
   EXPECT_EQ(hand_force(state, output)->device_holds_n, 30.0);
 }
 
-class ToolDialog : public test::WindowBench {
+class ToolPanel : public test::WindowBench {
  protected:
   // The number of a gauge.
   [[nodiscard]] double gauge(const char* name) const { return QLocale().toDouble(label(name).section(' ', 0, 0)); }
-  // The haptic client says so of the tool over the bone.
+  // The haptic client reports this wear of the tool, while the pointer is over the bone.
   [[nodiscard]] bool is_as_blunt_as(const char* wear) {
     return until([&] {
       hover(middle());
@@ -107,7 +107,7 @@ class ToolDialog : public test::WindowBench {
 };
 
 // One session for all, because each window starts a server and two clients.
-TEST_F(ToolDialog, WearLawAndForceChoiceReachTheToolInTheHand) {
+TEST_F(ToolPanel, WearLawAndForceChoiceReachTheToolInTheHand) {
   open();
   ASSERT_TRUE(shows_force("proportional")) << problem();
   EXPECT_EQ(label("temperature"), "not simulated");
@@ -123,7 +123,7 @@ TEST_F(ToolDialog, WearLawAndForceChoiceReachTheToolInTheHand) {
   QTest::keyClick(law, Qt::Key_Down);
   EXPECT_EQ(law->currentText(), "Energy of the removed volume");
   EXPECT_EQ(view_->pointer().input().law, "allotta");
-  // Another tool has its own edge. The drill gets its wear and law back.
+  // Another tool has its own wear and law. The drill gets its wear and law back.
   click_tool("bur");
   EXPECT_TRUE(is_as_blunt_as("1.00")) << problem();
   EXPECT_EQ(law->currentText(), "Milling");
@@ -131,7 +131,7 @@ TEST_F(ToolDialog, WearLawAndForceChoiceReachTheToolInTheHand) {
   EXPECT_EQ(law->currentText(), "Energy of the removed volume");
   EXPECT_EQ(view_->pointer().input().law, "allotta");
   EXPECT_TRUE(is_as_blunt_as("2.50")) << problem();
-  // An item is placed by a click, so it has no edge to choose.
+  // An item is placed by a click, so nobody chooses wear and law for it.
   click_tool("pin");
   EXPECT_FALSE(law->isEnabled());
   EXPECT_FALSE(window_->findChild<QDoubleSpinBox*>("wear_set")->isEnabled());
@@ -139,7 +139,7 @@ TEST_F(ToolDialog, WearLawAndForceChoiceReachTheToolInTheHand) {
   // Another way to show force starts the client again. Its drill is as blunt as before, and the hand gets less than the
   // bone gives.
   trigger("force_compressed");
-  EXPECT_EQ(window_->statusBar()->currentMessage(), "The haptic client starts again with it.");
+  EXPECT_EQ(window_->statusBar()->currentMessage(), "The haptic client starts again to show force in this way.");
   ASSERT_TRUE(shows_force("compressed")) << problem();
   click_tool("drill");
   ASSERT_TRUE(is_as_blunt_as("2.50")) << problem();
@@ -155,7 +155,7 @@ TEST_F(ToolDialog, WearLawAndForceChoiceReachTheToolInTheHand) {
   show();
   EXPECT_TRUE(window_->findChild<QAction*>("force_compressed")->isChecked());
   trigger("force_proportional");
-  EXPECT_EQ(window_->statusBar()->currentMessage(), "The next practice room begins with it.");
+  EXPECT_EQ(window_->statusBar()->currentMessage(), "The next practice room shows force in this way.");
 }
 
 }  // namespace

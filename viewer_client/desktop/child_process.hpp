@@ -12,10 +12,10 @@ class ChildProcess : public QProcess {
  public:
   // Its messages go to `log_file`.
   explicit ChildProcess(const QString& log_file);
-  // As end(), with the patience that a program without a deadline gets.
+  // As end(), with a patience of its own.
   ~ChildProcess() override;
 
-  // Asks it to end and returns at once. From now on nobody hears of its end.
+  // Asks it to end and returns at once. From now on its signals reach nobody.
   void ask_to_end();
   // Asks it to end, waits so long, and then ends it by force.
   void end(std::chrono::milliseconds patience);

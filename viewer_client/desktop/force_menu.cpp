@@ -38,10 +38,10 @@ QString chosen_force() {
 }
 
 void fill_force_menu(QMenu& menu, const std::function<void()>& chosen) {
-  const QString when = QCoreApplication::translate(
-                           "Force", "The window's haptic client starts again: the tool leaves the bone for seconds.") +
-                       ' ' +
-                       QCoreApplication::translate("Force", "Other haptic clients have the option --force-choice.");
+  const QString when =
+      QCoreApplication::translate(
+          "Force", "The window's haptic client starts again: the tool leaves the bone for some seconds.") +
+      ' ' + QCoreApplication::translate("Force", "Other haptic clients have the option --force-choice.");
   menu.setToolTipsVisible(true);
   auto* group = new QActionGroup(&menu);
   for (const ForceEntry& entry : kForceEntries) {

@@ -1,5 +1,5 @@
 // The gauges of the tool: push, force of the bone and on the hand, torque, depth, spindle, feed, density, flutes and
-// wear. Temperature has its place and says that it is not simulated. A plot shows both forces over the last ten
+// wear. The gauge of the temperature says that it is not simulated. A plot shows both forces over the last ten
 // seconds, and a bar how much of what the device holds the hand gets.
 #pragma once
 #include <QCoreApplication>

@@ -149,7 +149,7 @@ void MainWindow::make_panels() {
         if (chosen.push_n != view_->pointer().push_n()) tour_->did(TourStep::strength);
         view_->pointer().set_spindle_speed(chosen.spindle_rpm);
         view_->pointer().set_push(chosen.push_n);
-        view_->pointer().set_edge(chosen.edge.wear, chosen.edge.law);
+        view_->pointer().set_wear_and_law(chosen.wear_and_law.wear, chosen.wear_and_law.law);
         send_pointer();
       },
       [this](const std::string& tool) { take_tool(tool); });
@@ -412,8 +412,8 @@ void MainWindow::take_tool(const std::string& tool) {
   if (held) {
     placing_.clear();
     view_->pointer().take(tool);
-    const PropertiesPanel::Edge edge = properties_->chosen().edge;
-    view_->pointer().set_edge(edge.wear, edge.law);
+    const PropertiesPanel::WearAndLaw chosen = properties_->chosen().wear_and_law;
+    view_->pointer().set_wear_and_law(chosen.wear, chosen.law);
     view_->set_holding(true);
     spindle_->setChecked(true);
     view_->pointer().set_spindle(true);

@@ -99,9 +99,10 @@ class MainWindow : public QMainWindow {
   [[nodiscard]] bool is_busy() const;
   // The practice room has ended for good, for this reason.
   void practice_failed(const QString& sentence);
-  // Looks whether a case is damaged. Then it is made anew. Otherwise the start page shows `sentence`.
+  // Checks a case. Makes a damaged one anew. For a sound one the start page shows `sentence`.
   void check_case(const RecentEntry& entry, const QString& sentence);
-  // The case of an example, and its session goes on. An unpacked case is removed: its file makes it again.
+  // Makes the case of an example again and goes on with its session. Removes an unpacked case: the user opens its file
+  // again.
   void make_anew(const RecentEntry& entry);
   void choose_scan();
   void choose_case();
@@ -157,7 +158,7 @@ class MainWindow : public QMainWindow {
   std::unique_ptr<Leftovers> leftovers_;  // outlives the programs below
   std::unique_ptr<CaseMaker> maker_;
   std::unique_ptr<ImporterRun> saver_, checker_;
-  std::filesystem::path made_anew_;  // the case for which that was tried; empty: it opened since
+  std::filesystem::path made_anew_;  // the case that make_anew() got last; empty: a room has opened since
   std::unique_ptr<PointerServer> pointer_;
   std::unique_ptr<PracticeRoom> practice_;
   std::unique_ptr<RoomLink> room_;

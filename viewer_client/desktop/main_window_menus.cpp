@@ -128,9 +128,9 @@ void MainWindow::make_tools_menu() {
   spindle_->setCheckable(true);
   make_other_hand(tools);
   fill_force_menu(*tools->addMenu(tr("Force on the hand")), [this] {
-    if (!practice_) return say(tr("The next practice room begins with it."));
+    if (!practice_) return say(tr("The next practice room shows force in this way."));
     practice_->show_force(chosen_force());
-    say(tr("The haptic client starts again with it."));
+    say(tr("The haptic client starts again to show force in this way."));
   });
   sound_ = add_action(
       tools, tr("S&ound"), "sound", QKeySequence("Ctrl+Shift+S"),

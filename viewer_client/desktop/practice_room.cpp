@@ -17,8 +17,8 @@ constexpr int kMostDeaths = 3;
 constexpr int kSettled_ms = 20000;
 constexpr int kAddressPeriod_ms = 30;
 constexpr int kRestart_ms = 300;
-// What ends as it should needs a second for all. A program that hangs must not hold the window, and what it
-// acknowledged is on the disk: the journal syncs before it acknowledges. So it is killed.
+// Programs that do not hang need a second together. One that hangs must not hold the window, so it is killed. That
+// loses nothing that was acknowledged, because the journal syncs before the server acknowledges.
 constexpr std::chrono::milliseconds kClientsEnd{1200}, kAllEnd{1700};
 constexpr int kEnd_ms = 8000;  // for a child that starts again
 

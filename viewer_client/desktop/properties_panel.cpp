@@ -26,8 +26,8 @@ namespace {
 
 constexpr int kMostRpm = 100000;
 
-// Wide enough for each of its items, and empty. So the panel, and with it the picture beside it, never changes its
-// width.
+// Makes a box wide enough for each of its items, and empties it. So the panel never changes its width, and neither does
+// the picture beside it.
 void fix_width(QComboBox& box) {
   box.setMinimumWidth(box.sizeHint().width());
   box.clear();
@@ -68,7 +68,7 @@ PropertiesPanel::PropertiesPanel(std::function<void(const Chosen&)> changed,
   wear_->setRange(kSharp, kBluntest);
   wear_->setDecimals(1);
   wear_->setSingleStep(0.1);
-  wear_->setKeyboardTracking(false);  // a number is whole when the user has left it
+  wear_->setKeyboardTracking(false);  // half a typed number does not count
   wear_->setToolTip("<p>" + tr("1 is sharp, 2 is blunt. A change acts at once, also while the tool cuts.") + ' ' +
                     tr("Cutting blunts the tool further. The gauge shows how blunt it is.") + "</p>");
   row(tr("Wear"), "wear_set", wear_);
@@ -87,27 +87,27 @@ PropertiesPanel::PropertiesPanel(std::function<void(const Chosen&)> changed,
   connect(size_, QOverload<int>::of(&QComboBox::activated), this,
           [this](int index) { resized_(size_->itemData(index).toString().toStdString()); });
   connect(wear_, QOverload<double>::of(&QDoubleSpinBox::valueChanged), this, [this, say](double wear) {
-    if (!showing_) edges_[tool_].wear = wear;
+    if (!showing_) chosen_[tool_].wear = wear;
     say();
   });
   connect(law_, QOverload<int>::of(&QComboBox::currentIndexChanged), this, [this, say](int index) {
     const QString law = law_->itemData(index).toString();
     law_->setToolTip(law.isEmpty() ? QString() : tr("The law \"%1\" in the list of osteon-haptic laws").arg(law));
-    if (!showing_) edges_[tool_].law = law.toStdString();
+    if (!showing_) chosen_[tool_].law = law.toStdString();
     say();
   });
   setEnabled(false);
 }
 
-void PropertiesPanel::show_edge(const Tool& tool, bool held) {
-  const auto chosen = edges_.find(tool.name);
-  const Edge edge = chosen == edges_.end() ? Edge{} : chosen->second;
-  wear_->setValue(edge.wear.value_or(kSharp));
+void PropertiesPanel::show_wear_and_law(const Tool& tool, bool held) {
+  const auto found = chosen_.find(tool.name);
+  const WearAndLaw chosen = found == chosen_.end() ? WearAndLaw{} : found->second;
+  wear_->setValue(chosen.wear.value_or(kSharp));
   law_->clear();
   for (const ForceLaw& law : force_laws())
     if (tool.cuts() && law.fits(tool.kind))
       law_->addItem(law_title(std::string(law.name)), QString::fromStdString(std::string(law.name)));
-  if (const Result<const ForceLaw*> law = choose_law(tool, edge.law))
+  if (const Result<const ForceLaw*> law = choose_law(tool, chosen.law))
     law_->setCurrentIndex(law_->findData(QString::fromStdString(std::string((*law)->name))));
   for (QWidget* part : std::initializer_list<QWidget*>{wear_, law_}) part->setEnabled(held);
 }
@@ -129,7 +129,7 @@ void PropertiesPanel::show_tool(const std::string& name, bool held) {
   teeth_->setText(tool->teeth > 0 ? QString::number(tool->teeth) : QString("–"));
   feed_->setText(tool->feed_mm_per_rev > 0.0 ? tr("%1 mm").arg(QLocale().toString(tool->feed_mm_per_rev, 'g', 3))
                                              : QString("–"));
-  show_edge(*tool, held);
+  show_wear_and_law(*tool, held);
   showing_ = false;
 }
 
@@ -152,9 +152,9 @@ void PropertiesPanel::add_switch(QAction& action) {
 }
 
 PropertiesPanel::Chosen PropertiesPanel::chosen() const {
-  const auto edge = edges_.find(tool_);
+  const auto found = chosen_.find(tool_);
   return {static_cast<double>(rpm_->value()), static_cast<double>(push_->value()),
-          edge == edges_.end() ? Edge{} : edge->second};
+          found == chosen_.end() ? WearAndLaw{} : found->second};
 }
 
 }  // namespace osteon

@@ -1,5 +1,5 @@
-// The properties of the tool in the hand, as in Niu 2008, Figure 9.6: size, spindle speed, push, teeth, feed, and how
-// its edge cuts: wear and force law. A change reaches picture, force and sound at once.
+// The properties of the tool in the hand, as in Niu 2008, Figure 9.6: size, spindle speed, push, teeth, feed, wear and
+// force law. A change reaches picture, force and sound at once.
 #pragma once
 #include <QCoreApplication>
 #include <QWidget>
@@ -23,21 +23,22 @@ class PropertiesPanel : public QWidget {
   Q_DECLARE_TR_FUNCTIONS(PropertiesPanel)
 
  public:
-  // What the user chose of a tool's edge, until the window closes.
-  struct Edge {
+  // What the user chose for a tool. The choice lasts until the window closes.
+  struct WearAndLaw {
     std::optional<double> wear;  // none: as the tool is
     std::string law;             // empty: the tool's own
   };
   struct Chosen {
     double spindle_rpm = 0;
     double push_n = 10;
-    Edge edge;
+    WearAndLaw wear_and_law;
   };
   // `resized`: the user chose the tool of another size in the same group.
   PropertiesPanel(std::function<void(const Chosen&)> changed, std::function<void(const std::string&)> resized,
                   QWidget* parent = nullptr);
 
-  // Shows the tool's own values, and the edge that was chosen for it. `held`: it can be held here, so its edge counts.
+  // Shows the tool's own values, and the wear and law that were chosen for it. `held`: it can be held here. Otherwise
+  // wear and law cannot be chosen.
   void show_tool(const std::string& tool, bool held);
   void show_push(double push_n);
   // A check box for an action that can be checked. Either shows the other's state.
@@ -45,7 +46,7 @@ class PropertiesPanel : public QWidget {
   [[nodiscard]] Chosen chosen() const;
 
  private:
-  void show_edge(const Tool& tool, bool held);
+  void show_wear_and_law(const Tool& tool, bool held);
 
   std::function<void(const Chosen&)> changed_;
   std::function<void(const std::string&)> resized_;
@@ -56,8 +57,8 @@ class PropertiesPanel : public QWidget {
   QLabel *teeth_, *feed_;
   QDoubleSpinBox* wear_;
   QComboBox* law_;
-  std::string tool_;                   // shown
-  std::map<std::string, Edge> edges_;  // of each tool whose edge was chosen
+  std::string tool_;                          // shown
+  std::map<std::string, WearAndLaw> chosen_;  // by the name of the tool
 };
 
 }  // namespace osteon

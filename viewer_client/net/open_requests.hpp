@@ -1,4 +1,4 @@
-// The requests of a client that wait for an answer, so that whoever ends can cancel them. Any thread.
+// The requests of a client that wait for an answer. Whoever ends the client cancels them here. Any thread.
 #pragma once
 #include <set>
 

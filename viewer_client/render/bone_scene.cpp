@@ -147,7 +147,7 @@ void BoneScene::draw() {
   const CameraView view = camera();
   const bool two_pictures = stereo() == StereoMode::side_by_side;
   impl_->marker.follow(view);
-  impl_->stereo.place(view);  // before what belongs to points of the pictures
+  impl_->stereo.place(view);  // first, because names and axes are placed with these cameras
   impl_->people->place(two_pictures);
   impl_->plan->place(two_pictures);
   impl_->renderer->ResetCameraClippingRange();

@@ -33,7 +33,7 @@ void ToolPointer::take(const std::string& tool) {
   input_.tool = tool;
   input_.empty_hand = input_.push = false;
   input_.spindle_rpm = 0.0;
-  set_edge(std::nullopt, {});
+  set_wear_and_law(std::nullopt, {});
   turn_.setIdentity();
   roll_rad_ = 0.0;
   aim();
@@ -46,7 +46,7 @@ void ToolPointer::put_down() {
   leave();
 }
 
-void ToolPointer::set_edge(const std::optional<double>& wear, const std::string& law) {
+void ToolPointer::set_wear_and_law(const std::optional<double>& wear, const std::string& law) {
   input_.wear = wear;
   input_.law = law;
 }

@@ -21,7 +21,7 @@ class ToolPointer {
   void set_suction(bool on) { input_.suction = on; }
   void set_spindle_speed(double rpm) { input_.spindle_rpm = rpm; }  // 0: the tool's own
   // Wear and force law of the tool, as PointerInput says.
-  void set_edge(const std::optional<double>& wear, const std::string& law);
+  void set_wear_and_law(const std::optional<double>& wear, const std::string& law);
 
   // The pointer moved to this ray. While nobody pushes, the tool rests where the ray meets the surface and points along
   // the mean normal into the bone. While somebody pushes, the tool keeps its direction and moves across it.

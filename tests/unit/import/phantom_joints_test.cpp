@@ -1,5 +1,5 @@
 // Phantoms of more than one bone that come back from a CT. Each takes a quarter of a minute, so they run every night.
-// Every time a femur comes back, and a knee through the program (phantom_bone_test.cpp).
+// deploy/test runs those of a femur, and of a knee through the program (phantom_bone_test.cpp).
 #include <gtest/gtest.h>
 
 #include <cstdio>

@@ -177,7 +177,7 @@ TEST(PointerMessage, EachFieldOfTheWindowIsChecked) {
                       input_refusal);
 }
 
-TEST(PointerMessage, AnOlderWindowHasNoOtherHandAndChangesNoEdge) {
+TEST(PointerMessage, AnOlderWindowHasNoOtherHandAndChangesNoWearOrLaw) {
   json message = json::parse(encode(an_input()));
   for (const std::string& field : kOptional) message.erase(field);
   const auto read = read_pointer_input(message.dump());

@@ -141,8 +141,8 @@ TEST(CaseArchive, DamagedAndOtherFilesAreSaid) {
   EXPECT_EQ(missing.error().code, ErrorCode::not_found);
 }
 
-// Readers find the files by the record at the end, and by the list before it, whose entries begin with PK\1\2. Whoever
-// damages one bit of them has removed no file.
+// Readers find the files by the record at the end, and by the list before it, whose entries begin with PK\1\2. One
+// damaged bit there removes no file.
 TEST(CaseArchive, ADamagedListOfFilesIsNoMissingFile) {
   const Bytes whole = zip(kCase);
   const std::string_view text(reinterpret_cast<const char*>(whole.data()), whole.size());

@@ -177,7 +177,7 @@ TEST_F(OnBall, TheWheelSetsThePushWithinItsBounds) {
 TEST_F(OnBall, AnotherToolHasItsOwnSpeedWearAndLaw) {
   pointer_.take("drill-3.2");
   pointer_.set_spindle_speed(700.0);
-  pointer_.set_edge(2.5, "allotta");
+  pointer_.set_wear_and_law(2.5, "allotta");
   EXPECT_EQ(pointer_.input().wear, 2.5);
   EXPECT_EQ(pointer_.input().law, "allotta");
   pointer_.take("burr-round-5");

@@ -240,8 +240,8 @@
         <translation>Logarithmus: Schwache Kräfte behalten ihr Verhältnis, starke rücken zusammen.</translation>
     </message>
     <message>
-        <source>The window&apos;s haptic client starts again: the tool leaves the bone for seconds.</source>
-        <translation>Das Haptikprogramm startet neu: Das Werkzeug verlässt für Sekunden den Knochen.</translation>
+        <source>The window&apos;s haptic client starts again: the tool leaves the bone for some seconds.</source>
+        <translation>Das Haptikprogramm startet neu: Das Werkzeug ist einige Sekunden nicht im Knochen.</translation>
     </message>
     <message>
         <source>Other haptic clients have the option --force-choice.</source>
@@ -920,19 +920,19 @@
     </message>
     <message>
         <source>The unpacked copy of %1 was damaged and is removed. Open the file again.</source>
-        <translation>Die entpackte Kopie von %1 war beschädigt und ist entfernt. Die Datei neu öffnen.</translation>
+        <translation>Die entpackte Kopie von %1 war beschädigt und wurde entfernt. Die Datei neu öffnen.</translation>
     </message>
     <message>
         <source>Force on the hand</source>
         <translation>Kraft auf die Hand</translation>
     </message>
     <message>
-        <source>The next practice room begins with it.</source>
-        <translation>Der nächste Übungsraum beginnt damit.</translation>
+        <source>The next practice room shows force in this way.</source>
+        <translation>Der nächste Übungsraum zeigt die Kraft so.</translation>
     </message>
     <message>
-        <source>The haptic client starts again with it.</source>
-        <translation>Das Haptikprogramm startet damit neu.</translation>
+        <source>The haptic client starts again to show force in this way.</source>
+        <translation>Das Haptikprogramm startet neu, um die Kraft so zu zeigen.</translation>
     </message>
 </context>
 <context>

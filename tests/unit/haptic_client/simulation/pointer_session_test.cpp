@@ -467,7 +467,7 @@ double steady_feed_mm_per_s(bool chi, double wear, double rpm, double push_n) {
   return low;
 }
 
-// What the message says of the tool's edge acts in the bone, in the middle of a push.
+// Wear and law of the message act in the bone, in the middle of a push.
 TEST_F(PointedHand, WearAndLawOfAMessageActWhileTheToolCuts) {
   begin();
   run(1500);
@@ -496,8 +496,8 @@ TEST_F(PointedHand, WearAndLawOfAMessageActWhileTheToolCuts) {
   expect_feed(false, 1.0, 500);
 }
 
-// Each tool has its own edge. A message that comes again does not sharpen a tool that work has blunted.
-TEST_F(PointedHand, TheEdgeIsOfTheToolThatTheMessageNames) {
+// Each tool has its own wear and law. A message that comes again does not sharpen a tool that work has blunted.
+TEST_F(PointedHand, WearAndLawAreThoseOfTheToolThatTheMessageNames) {
   const auto state = [&] {
     exchange_.states.refresh();
     return exchange_.states.value();

@@ -163,10 +163,10 @@ class GivenEnergy {
   double given_mj_ = 0, most_mj_ = 0;
 };
 
-// A drill is fed at 1 mm/s, and its edge changes in the bone. Wear enters Chi's thrust in proportion, and the thrust is
-// as N^-0.3327: a spindle that droops more has a little more. Another law has its own thrust. The spring's force grows
-// no faster than the hand stretches it: K v in a second.
-TEST(ToolEffects, AnEdgeThatChangesInTheBoneHasItsOwnThrustAndNoJump) {
+// A drill is fed at 1 mm/s, and its wear and law change in the bone. Wear enters Chi's thrust in proportion, and the
+// thrust is as N^-0.3327: a spindle that droops more has a little more. Another law has its own thrust. The spring's
+// force grows no faster than the hand stretches it: K v in a second.
+TEST(ToolEffects, AChangeOfWearOrLawInTheBoneChangesTheThrustWithoutAJump) {
   LoopParams params;
   params.peak_n = 200.0;
   Rig rig(slab(22.0, 1.9), *find_tool("drill-3.2"), params);
