@@ -29,10 +29,11 @@ void PlayedPointerSession::take_up(const RecordedTakeUp& taken, SurgeonOrder& or
 }
 
 // The person may have changed both in any tick. Where nobody did, cutting has blunted the tool as in the recording, so
-// the values stay the same.
+// the values stay the same. A law that does not fit the tool, as of a changed file, is not used.
 void PlayedPointerSession::take_wear_and_law(const PointerTick& now) noexcept {
   loop_.set_wear(tool_, now.wear);
-  if (const ForceLaw* law = laws_[now.law]) loop_.set_law(tool_, *law);
+  const ForceLaw* law = laws_[now.law];
+  if (law && law->fits(plan_.tools[static_cast<std::size_t>(tool_)].tool.kind)) loop_.set_law(tool_, *law);
 }
 
 SessionTick PlayedPointerSession::tick(const Patch& patch, RoomLink room, int periods,
