@@ -23,7 +23,6 @@ void ImporterRun::start() {
   importer_ = std::make_unique<ChildProcess>(log_file_);
   connect(importer_.get(), QOverload<int, QProcess::ExitStatus>::of(&QProcess::finished), this,
           [this](int code, QProcess::ExitStatus how) { ended(how == QProcess::NormalExit ? code : -1); });
-  connect(importer_.get(), &QProcess::started, this, [this] { ran_ = true; });
   connect(importer_.get(), &QProcess::errorOccurred, this, [this](QProcess::ProcessError error) {
     if (error != QProcess::FailedToStart) return;
     progress_timer_.stop();
@@ -58,6 +57,7 @@ void ImporterRun::ended(int code) {
   const QString why =
       code < 0 ? tr("osteon-import was ended by force or crashed. Try again.") : importer_->last_sentence();
   QFile::remove(log_file_);
+  refused_ = code > 0 && !cancelled_;
   if (code == 0) return events_.done(QString::fromUtf8(importer_->readAllStandardOutput()));
   events_.failed(cancelled_ ? QString() : why.isEmpty() ? tr("osteon-import ended without a result.") : why);
 }

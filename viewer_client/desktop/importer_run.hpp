@@ -27,8 +27,8 @@ class ImporterRun : public QObject {
 
   void start();
   void cancel();
-  // The program is installed and began.
-  [[nodiscard]] bool ran() const { return ran_; }
+  // The program ended by itself and reported an error. A crash or a signal tells nothing about its input.
+  [[nodiscard]] bool refused() const { return refused_; }
 
  private:
   void read_progress();
@@ -37,7 +37,7 @@ class ImporterRun : public QObject {
   QStringList arguments_;
   QString log_file_;
   Events events_;
-  bool cancelled_ = false, ran_ = false;
+  bool cancelled_ = false, refused_ = false;
   QTimer progress_timer_;
   std::unique_ptr<ChildProcess> importer_;
 };

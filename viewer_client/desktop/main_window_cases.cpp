@@ -73,8 +73,8 @@ void MainWindow::check_case(const RecentEntry& entry, const QString& sentence) {
                                                           end();
                                                           start_->end_work(sentence);
                                                         },
-                                                        [this, end, entry, sentence](const QString& why) {
-                                                          const bool damaged = checker_->ran() && !why.isEmpty();
+                                                        [this, end, entry, sentence](const QString&) {
+                                                          const bool damaged = checker_->refused();
                                                           end();
                                                           damaged ? make_anew(entry) : start_->end_work(sentence);
                                                         }});
