@@ -5,8 +5,16 @@
 
 namespace osteon::test {
 
+namespace {
+#ifdef OSTEON_SLOW_TESTS
+constexpr int kSlower = 5;  // under a sanitizer, as the limits of ctest
+#else
+constexpr int kSlower = 1;
+#endif
+}  // namespace
+
 bool wait_until(const std::function<bool()>& condition, std::chrono::milliseconds patience) {
-  const auto deadline = std::chrono::steady_clock::now() + patience;
+  const auto deadline = std::chrono::steady_clock::now() + kSlower * patience;
   while (!condition()) {
     if (std::chrono::steady_clock::now() >= deadline) return false;
     std::this_thread::sleep_for(std::chrono::milliseconds{2});
