@@ -46,7 +46,9 @@ class RecordedRoom : public testing::Test {
                                 expression + "))",
                             file});
     EXPECT_EQ(answer.exit_code, 0) << answer.err;
-    return json::parse(answer.out, nullptr, false);
+    const json result = json::parse(answer.out, nullptr, false);
+    EXPECT_FALSE(result.is_discarded()) << expression << " is " << answer.out;
+    return result;
   }
 };
 
@@ -68,7 +70,9 @@ TEST_F(RecordedRoom, HoldsEveryTickAndIsPlayedAgainInAnotherRoom) {
   // Chi (7.3) at 1000 rpm and 4 mm/s in the far cortex, along the tool's axis. The bone pushes back, against the tool's
   // +z.
   const double thrust_n = 134.6 * std::pow(1000.0, -0.3327) * std::pow(4.0, 0.5189) * std::pow(1.9, 1.1841);
-  const std::string far = "(lambda d: (d > 26.5) & (d < 29.5) & (d >= np.maximum.accumulate(d)))(f['data/depth'][:])";
+  // On a busy machine a patch may be late, and the tool then rebounds. Only ticks at that feed are compared.
+  const std::string far =
+      "(lambda d: (d > 26.5) & (d < 29.5) & (np.abs(f['data/feed'][:] - 4.0) < 0.1))(f['data/depth'][:])";
   EXPECT_NEAR(ask(file, "float(np.mean(np.linalg.norm(f['drill_force_physical/wrench'][:, :3], axis=1)[" + far + "]))")
                   .get<double>(),
               thrust_n, 0.06 * thrust_n);

@@ -221,7 +221,7 @@
     </message>
     <message>
         <source>All ratios of forces stay. A weak device hides weak forces.</source>
-        <translation>Alle Verhältnisse der Kräfte bleiben. Ein schwaches Gerät verbirgt schwache Kräfte.</translation>
+        <translation>Alle Kraftverhältnisse bleiben. Ein schwaches Gerät verbirgt schwache Kräfte.</translation>
     </message>
     <message>
         <source>&amp;Compressed</source>
