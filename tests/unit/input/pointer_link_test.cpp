@@ -183,7 +183,7 @@ TEST(PointerMessage, AnOlderWindowHasNoOtherHandAndChangesNoWearOrLaw) {
   const auto read = read_pointer_input(message.dump());
   ASSERT_TRUE(read) << read.error().message;
   PointerInput expected = an_input();
-  expected.irrigation = expected.suction = false;
+  expected.irrigation = expected.suction = expected.empty_hand = false;
   expected.wear.reset();
   expected.law.clear();
   EXPECT_EQ(*read, expected);
