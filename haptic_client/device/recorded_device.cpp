@@ -28,7 +28,12 @@ class Reader {
       return wrong(ErrorCode::invalid_input, path_.string() + " is not an HDF5 file; give one that --record wrote");
     // A file that is being written, or whose writer was killed, opens only in this mode. A file of another program
     // perhaps opens only in the other mode.
-    file_ = Hdf5Handle(H5Fopen(path_.c_str(), H5F_ACC_RDONLY | H5F_ACC_SWMR_READ, H5P_DEFAULT), H5Fclose);
+    // In this mode HDF5 reads a part with a wrong checksum again, because a writer may just have changed it. It waits
+    // 1 ns, and each time twice as long. Its own limit of 100 attempts never ends in a damaged file; 24 take 17 ms.
+    constexpr unsigned kAttempts = 24;
+    const Hdf5Handle access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
+    H5Pset_metadata_read_attempts(access.id(), kAttempts);
+    file_ = Hdf5Handle(H5Fopen(path_.c_str(), H5F_ACC_RDONLY | H5F_ACC_SWMR_READ, access.id()), H5Fclose);
     if (!file_.ok()) file_ = Hdf5Handle(H5Fopen(path_.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT), H5Fclose);
     if (!file_.ok())
       return wrong(ErrorCode::invalid_input,

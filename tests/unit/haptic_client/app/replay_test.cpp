@@ -2,13 +2,17 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <fstream>
 #include <functional>
+#include <random>
 
 #include "common/mechanics/force_law.hpp"
 #include "haptic_client/app/record_file.hpp"
 #include "haptic_client/device/recorded_device.hpp"
 #include "haptic_client/simulation/played_pointer.hpp"
 #include "haptic_client/simulation/pointer_session.hpp"
+#include "tests/support/changed_bytes.hpp"
+#include "tests/support/content.hpp"
 #include "tests/support/temp_dir.hpp"
 #include "tests/unit/haptic_client/bench.hpp"
 
@@ -203,6 +207,26 @@ TEST(Replay, OfAPointerMakesTheSameCutsAndForces) {
   EXPECT_EQ(to_hex(bench.replica().committed().hash()), made.field_hash);
   EXPECT_EQ(bench.cuts(), made.cuts);
   EXPECT_EQ(again.forces, made.forces);
+}
+
+// HDF5 would read a damaged part again and again, without end.
+TEST(Replay, OfADamagedFileIsReadOrRefused) {
+  constexpr int kTrials = 60;
+  const osteon::test::TempDir temp;
+  record(block_case(), {drill(HandKind::expert, {0.1, -0.2, 0})}, {}, temp / "a.h5");
+  const std::string whole = osteon::test::content(temp / "a.h5");
+  std::mt19937 random(1);
+  int refused = 0;
+  for (int i = 0; i < kTrials; ++i) {
+    const auto file = temp / "damaged.h5";
+    std::ofstream(file, std::ios::binary) << osteon::test::changed_bytes(whole, random, 30000);
+    const Result<RecordedSession> read = read_recording(file);
+    if (read) continue;
+    ++refused;
+    EXPECT_NE(read.error().message.find("damaged.h5"), std::string::npos) << read.error().message;
+  }
+  EXPECT_GT(refused, kTrials / 10);
+  EXPECT_LT(refused, kTrials);
 }
 
 // A bone that moved on its mount moves again, even if the recording is played on a bone without a mount. Tools start,
