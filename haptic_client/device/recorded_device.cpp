@@ -308,7 +308,9 @@ void read_pointer(Reader& reader, RecordedSession& session) {
     return;
   }
   const std::size_t rows = reader.rows();
-  if (rows != session.readings.size()) {
+  const auto ticks = reader.values<std::uint64_t>(recording::kTick, H5T_NATIVE_UINT64, rows, 1);
+  if (!reader.ok()) return;
+  if (rows != session.readings.size() || ticks.front() != 1) {
     reader.wrong(ErrorCode::unsupported, reader.name() +
                                              " is of a pointer and lacks some ticks, so its tool cannot be led as it "
                                              "was; record it again on a machine with less load");

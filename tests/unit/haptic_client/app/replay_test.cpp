@@ -138,8 +138,8 @@ ReadyPlan pointed(const Case& bone) {
 }
 
 // It rests, drills, makes the drill blunt and chooses another law for it, takes the bur, burrs while it moves, and
-// leaves the bone.
-Session record_pointer(const Case& bone, const std::filesystem::path& file) {
+// leaves the bone. Without the rows of the first ticks, if some are `lost`.
+Session record_pointer(const Case& bone, const std::filesystem::path& file, std::uint64_t lost = 0) {
   PointerExchange exchange;
   const SimulatedDeviceParams device{"pointer", SimulatedDeviceParams{}.limits};
   auto made = std::make_unique<PointerSession>(pointed(bone), exchange, device, 0.0);
@@ -177,7 +177,9 @@ Session record_pointer(const Case& bone, const std::filesystem::path& file) {
       }
       const SessionTick tick = bench.tick();
       const TickRow row = row_of(hand, tick);
-      EXPECT_TRUE(recording->append({&row, 1}));
+      if (tick.report.state_seq > lost) {
+        EXPECT_TRUE(recording->append({&row, 1}));
+      }
       session.forces.push_back(tick.report.coupling.force_n);
       bench.follow();
     }
@@ -207,6 +209,16 @@ TEST(Replay, OfAPointerMakesTheSameCutsAndForces) {
   EXPECT_EQ(to_hex(bench.replica().committed().hash()), made.field_hash);
   EXPECT_EQ(bench.cuts(), made.cuts);
   EXPECT_EQ(again.forces, made.forces);
+}
+
+// The handle of a pointer says where it is only together with all that it did before.
+TEST(Replay, OfAPointerNeedsTheFirstTickToo) {
+  const osteon::test::TempDir temp;
+  record_pointer(block_case(), temp / "a.h5", 1);
+  const Result<RecordedSession> read = read_recording(temp / "a.h5");
+  ASSERT_FALSE(read);
+  EXPECT_EQ(read.error().code, ErrorCode::unsupported);
+  EXPECT_NE(read.error().message.find("lacks some ticks"), std::string::npos) << read.error().message;
 }
 
 // HDF5 would read a damaged part again and again, without end.
