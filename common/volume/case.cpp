@@ -362,7 +362,7 @@ Result<Case> Case::load(const std::filesystem::path& folder) {
   const auto file = folder / kInfoFile;
   if (std::filesystem::is_regular_file(folder))
     return bad_input(folder.string() +
-                     " is a file, but a case is a folder; unpack a case file with: osteon-import unpack " +
+                     " is a file, but a case is a folder; if it is a case file, unpack it with: osteon-import unpack " +
                      folder.string() + " --out FOLDER");
   if (!std::filesystem::is_directory(folder))
     return failure(ErrorCode::not_found,

@@ -154,7 +154,8 @@ void PracticeRoom::want_sound() {
 void PracticeRoom::show_force(const QString& choice) {
   if (std::exchange(options_.force_choice, choice) == choice) return;
   if (!haptic_ || haptic_->state() == QProcess::NotRunning) return;  // it is about to start
-  haptic_renewed_ = true;
+  // A second signal would end it in a hurry. It starts with the newest choice.
+  if (std::exchange(haptic_renewed_, true)) return;
   haptic_->terminate();
   QTimer::singleShot(kEnd_ms, haptic_.get(), [child = haptic_.get()] { child->kill(); });
 }
