@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "common/input/pointer_link.hpp"
+#include "common/mechanics/force_law.hpp"
 #include "haptic_client/device/hdf5_handle.hpp"
 #include "haptic_client/device/recording_layout.hpp"
 
@@ -388,6 +389,11 @@ Result<void> check_played(const RecordedSession& recorded, std::string_view name
   if (recorded.tools != tools)
     return failure(ErrorCode::invalid_input, is_of + "a session with " + list(recorded.tools) + ", not with " +
                                                  list(tools) + "; give the --plan or --tool that it was made with");
+  for (const std::string& law : recorded.laws)
+    if (!find_force_law(law))
+      return failure(ErrorCode::unsupported,
+                     std::string(name) + " used the force law \"" + law +
+                         "\", which this osteon-haptic does not know; play it with the release that recorded it");
   if (!recorded.plan_digest.empty() && recorded.plan_digest != plan_digest)
     return failure(
         ErrorCode::invalid_input,

@@ -32,7 +32,7 @@ void PlayedPointerSession::take_up(const RecordedTakeUp& taken, SurgeonOrder& or
 // the values stay the same. A law that does not fit the tool, as of a changed file, is not used.
 void PlayedPointerSession::take_wear_and_law(const PointerTick& now) noexcept {
   loop_.set_wear(tool_, now.wear);
-  const ForceLaw* law = laws_[now.law];
+  const ForceLaw* law = laws_[now.law];  // check_played() rejects unknown laws
   if (law && law->fits(plan_.tools[static_cast<std::size_t>(tool_)].tool.kind)) loop_.set_law(tool_, *law);
 }
 

@@ -58,7 +58,7 @@ void MainWindow::practice_failed(const QString& sentence) {
 }
 
 void MainWindow::check_case(const RecentEntry& entry, const QString& sentence) {
-  if (is_busy()) return;
+  if (is_busy()) return say(sentence);
   start_->show_work(tr("Checking %1").arg(case_title(entry.bone)));
   enable_opening(false);
   const auto end = [this] {

@@ -145,7 +145,7 @@ TEST(Recording, GivesTheDeviceBackBitForBit) {
 TEST(Recording, IsOfOneBoneToolAndPlan) {
   const TempDir temp;
   write_rows(temp / "a.h5", 3);
-  const auto session = read_recording(temp / "a.h5");
+  auto session = read_recording(temp / "a.h5");
   ASSERT_TRUE(session) << session.error().message;
   const RecordingInfo info = info_of_a_session();
   const std::vector<std::string> tools{"drill-3.2", "burr-round-5"};
@@ -163,6 +163,9 @@ TEST(Recording, IsOfOneBoneToolAndPlan) {
               HasSubstr("drill-3.2, burr-round-5, not with drill-3.2"));
   EXPECT_THAT(said(info.case_hash, {"burr-round-5", "drill-3.2"}, info.plan_digest), HasSubstr("--plan or --tool"));
   EXPECT_THAT(said(info.case_hash, tools, std::string(64, 'q')), HasSubstr("another plan"));
+  session->laws = {"chi", "law-of-a-later-release"};
+  EXPECT_THAT(said(info.case_hash, tools, info.plan_digest),
+              HasSubstr("\"law-of-a-later-release\", which this osteon-haptic does not know; play it with"));
 }
 
 // It also needs the bone in its state at the recording's start. A recording without that state plays on any bone.
