@@ -542,6 +542,14 @@ TEST_F(WindowTest, TheTourIsLedAndEndedByTheKeyboard) {
   examples->setFocus();
   QTest::keyClick(examples, Qt::Key_Escape);
   EXPECT_FALSE(tour->isVisible());
+  // One key ends it and puts the tool down.
+  open();
+  click_tool("drill");
+  trigger("tour_again");
+  view_->setFocus();
+  QTest::keyClick(view_, Qt::Key_Escape);
+  EXPECT_FALSE(tour->isVisible());
+  EXPECT_FALSE(view_->holding());
 }
 
 TEST_F(WindowTest, AKilledHapticClientComesBackAndCutsAgain) {

@@ -627,10 +627,11 @@ ConnectionState MainWindow::connections() {
   return state;
 }
 
-void MainWindow::keyPressEvent(QKeyEvent* event) {
-  // Reached where no part of the window has a use for Escape.
-  if (event->key() == Qt::Key_Escape) return tour_->end();
-  QMainWindow::keyPressEvent(event);
+bool MainWindow::event(QEvent* event) {
+  // Before any short cut or part of the window has the key, which also puts the tool down.
+  if (event->type() == QEvent::ShortcutOverride && static_cast<QKeyEvent*>(event)->key() == Qt::Key_Escape)
+    tour_->end();
+  return QMainWindow::event(event);
 }
 
 void MainWindow::showEvent(QShowEvent* event) {
