@@ -161,8 +161,11 @@ Faults unreachable(const QMenuBar& bar) {
   return faults;
 }
 
+// Of a label with a name, a screen reader reads that instead of the text.
 Faults nameless(const QWidget& window) {
   Faults faults;
+  for (const auto* label : visible<QLabel>(window))
+    if (!label->text().isEmpty() && !label->accessibleName().isEmpty()) faults.push_back(called(*label) + " is unread");
   for (const auto* button : visible<QAbstractButton>(window))
     if (button->text().isEmpty() && button->accessibleName().isEmpty()) faults.push_back(called(*button));
   return faults;
@@ -442,6 +445,10 @@ TEST_F(LanguageTest, NamelessAndUntranslatedTextsAreNoticed) {
   EXPECT_THAT(nameless(window), SizeIs(1));
   button->setAccessibleName("Bohrer");
   EXPECT_THAT(nameless(window), IsEmpty());
+  auto* label = new QLabel("2,5 mm", &window);
+  EXPECT_THAT(nameless(window), IsEmpty());
+  label->setAccessibleName("Tiefe");
+  EXPECT_THAT(nameless(window), SizeIs(1));
   EXPECT_THAT(untranslated({"Depth", "5 N", "Osteon"}, {"Depth", "5 N", "Osteon"}), SizeIs(1));
 }
 

@@ -16,7 +16,7 @@ constexpr const char* kWarning = "QLabel { background: #e69f00; color: black; fo
 }  // namespace
 
 RiskGauge::RiskGauge(QWidget* parent) : QLabel(parent) {
-  setAccessibleName(tr("Distance to the nearest structure at risk"));
+  setAccessibleDescription(tr("Distance to the nearest structure at risk"));
   limit_mm_ = QSettings().value(kLimitKey, kUsualLimit_mm).toDouble();
   hide();
 }
