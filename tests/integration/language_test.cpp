@@ -30,13 +30,16 @@
 #include <memory>
 #include <set>
 #include <string>
+#include <string_view>
 #include <vector>
 
+#include "common/phantoms/phantom_bone.hpp"
 #include "tests/integration/desk.hpp"
 #include "viewer_client/desktop/bone_view.hpp"
 #include "viewer_client/desktop/language.hpp"
 #include "viewer_client/desktop/main_window.hpp"
 #include "viewer_client/desktop/menu_keys.hpp"
+#include "viewer_client/desktop/structure_names.hpp"
 #include "viewer_client/scene/tool_groups.hpp"
 
 namespace osteon {
@@ -329,6 +332,31 @@ TEST_F(LanguageTest, TourSoundAndConnectionsAreWholeInBothLanguages) {
     window_->findChild<QAction*>("connections")->trigger();
   }
   EXPECT_THAT(untranslated(seen["en"], seen["de"]), IsEmpty());
+}
+
+// What Osteon itself names: planned axes and structures at risk of its phantoms.
+TEST_F(LanguageTest, NamesOfPhantomsAreTranslated) {
+  speak("de");
+  int names = 0;
+  const auto expect_german = [&](const std::string& name) {
+    ++names;
+    const QStringList english = QString::fromStdString(name).split(", "), german = structure_title(name).split(", ");
+    ASSERT_EQ(english.size(), german.size());
+    for (int part = 0; part < english.size(); ++part)
+      EXPECT_NE(english[part].toStdString(), german[part].toStdString()) << name;
+  };
+  for (const std::string_view kind : phantoms::kBoneKinds) {
+    phantoms::BoneRecipe recipe;
+    recipe.kind = kind;
+    const auto bone = phantoms::make_bone(recipe);
+    ASSERT_TRUE(bone) << kind;
+    for (const PlannedAxis& axis : (*bone)->anatomy().axes) expect_german(axis.name);
+    for (const phantoms::Structure& structure : (*bone)->structures()) expect_german(structure.name);
+  }
+  EXPECT_GT(names, 30);
+  EXPECT_EQ(structure_title("my own structure"), "my own structure");
+  speak("en");
+  EXPECT_EQ(structure_title("femur, mechanical axis"), "femur, mechanical axis");
 }
 
 TEST_F(LanguageTest, ShortCutsAreTheSameInBothLanguages) {

@@ -4,6 +4,8 @@
 #include <QSettings>
 #include <utility>
 
+#include "viewer_client/desktop/structure_names.hpp"
+
 namespace osteon {
 
 namespace {
@@ -41,7 +43,7 @@ void RiskGauge::show_tip(const std::optional<Vec3>& tip_mm) {
     clear();
     return;
   }
-  const QString whole = QString::fromStdString(plan_->structures[found->structure].name);
+  const QString whole = structure_title(plan_->structures[found->structure].name);
   const QString name = fontMetrics().elidedText(whole, Qt::ElideRight, kNameWidth_px);
   const QString distance = QLocale().toString(found->distance_mm, 'f', 1);
   const bool warns = found->distance_mm < limit_mm_;
