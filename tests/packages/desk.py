@@ -138,7 +138,7 @@ class Hands:
         self.clicks = 0
 
     def _do(self, *words):
-        done = subprocess.run(["xdotool", *map(str, words)], env=self._environment, capture_output=True, text=True,
+        done = subprocess.run(["xdotool", *map(str, words)], env=self._environment, capture_output=True, encoding="utf-8",
                               timeout=60, check=False)
         if done.returncode != 0:
             raise Failure(f"xdotool {' '.join(map(str, words))} failed:", done.stderr.strip())
@@ -185,10 +185,10 @@ class Hands:
         """Of all windows on the screen."""
         titles = []
         found = subprocess.run(["xdotool", "search", "--onlyvisible", "--name", "."], env=self._environment,
-                               capture_output=True, text=True, timeout=60, check=False)
+                               capture_output=True, encoding="utf-8", timeout=60, check=False)
         for window in found.stdout.split():
             named = subprocess.run(["xdotool", "getwindowname", window], env=self._environment, capture_output=True,
-                                   text=True, timeout=60, check=False)
+                                   encoding="utf-8", errors="replace", timeout=60, check=False)
             titles.append(named.stdout.rstrip("\n"))
         return titles
 
