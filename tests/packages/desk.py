@@ -138,8 +138,8 @@ class Hands:
         self.clicks = 0
 
     def _do(self, *words):
-        done = subprocess.run(["xdotool", *map(str, words)], env=self._environment, capture_output=True, encoding="utf-8",
-                              timeout=60, check=False)
+        done = subprocess.run(["xdotool", *map(str, words)], env=self._environment, capture_output=True,
+                              encoding="utf-8", timeout=60, check=False)
         if done.returncode != 0:
             raise Failure(f"xdotool {' '.join(map(str, words))} failed:", done.stderr.strip())
         return done.stdout
