@@ -154,11 +154,18 @@ void MainWindow::make_panels() {
       },
       [this](const std::string& tool) { take_tool(tool); });
   dock(tr("Tool"), "tool_panel", properties_, Qt::RightDockWidgetArea);
-  dock(tr("Gauges"), "gauges_panel", gauges_, Qt::RightDockWidgetArea);
-  dock(tr("Clipping"), "clipping_panel", clipping_, Qt::RightDockWidgetArea)->hide();
+  QDockWidget* gauges = dock(tr("Gauges"), "gauges_panel", gauges_, Qt::RightDockWidgetArea);
+  QDockWidget* clipping = dock(tr("Clipping"), "clipping_panel", clipping_, Qt::RightDockWidgetArea);
   QDockWidget* connections = dock(tr("Connections"), "connection_panel",
                                   new ConnectionPanel([this] { return this->connections(); }), Qt::RightDockWidgetArea);
-  connections->hide();
+  // One above the other, four panels would show little of each.
+  for (QDockWidget* panel : {clipping, connections}) {
+    tabifyDockWidget(gauges, panel);
+    panel->hide();
+    connect(panel->toggleViewAction(), &QAction::triggered, panel, [panel](bool on) {
+      if (on) panel->raise();
+    });
+  }
   connections->toggleViewAction()->setObjectName("connections");
   connections->toggleViewAction()->setShortcut(QKeySequence("Ctrl+Shift+N"));
 }
