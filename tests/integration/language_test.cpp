@@ -5,6 +5,7 @@
 #include <QAbstractButton>
 #include <QAction>
 #include <QComboBox>
+#include <QDateTime>
 #include <QDockWidget>
 #include <QGroupBox>
 #include <QHeaderView>
@@ -37,6 +38,7 @@
 #include "tests/integration/desk.hpp"
 #include "viewer_client/desktop/bone_view.hpp"
 #include "viewer_client/desktop/language.hpp"
+#include "viewer_client/desktop/library.hpp"
 #include "viewer_client/desktop/main_window.hpp"
 #include "viewer_client/desktop/menu_keys.hpp"
 #include "viewer_client/desktop/structure_names.hpp"
@@ -249,6 +251,16 @@ class LanguageTest : public testing::Test {
     const auto* device = window_->findChild<QLabel*>("device");
     ASSERT_TRUE(until([&] { return device->text() == QCoreApplication::translate("MainWindow", "Pointer"); }));
   }
+  // A session with the longest title among those of the examples.
+  static void remember_session() {
+    RecentEntry entry;
+    for (const ExampleBone& bone : example_bones())
+      if (bone.title.size() > entry.name.size()) entry.name = bone.title;
+    entry.bone = desk_->bone();
+    entry.session = desk_->temp().path() / "session";
+    entry.opened = QDateTime({2026, 11, 30}, {23, 59, 59});
+    remember(entry);
+  }
   void expect_whole(const std::string& where) {
     QCoreApplication::sendPostedEvents();  // a text that has just changed asks for another width
     EXPECT_THAT(clipped(*window_), IsEmpty()) << where;
@@ -284,7 +296,11 @@ std::unique_ptr<Desk> LanguageTest::desk_;
 TEST_F(LanguageTest, TheStartPageIsWholeInBothLanguages) {
   std::map<std::string, std::set<QString>> seen;
   for (const char* language : {"en", "de"}) {
+    speak(language);
+    remember_session();
     open_window(language);
+    const auto* recent = window_->findChild<QListWidget*>("recent");
+    ASSERT_EQ(recent->count(), 1);
     expect_whole(language);
     seen[language] = texts(*window_);
   }

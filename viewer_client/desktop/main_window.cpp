@@ -153,14 +153,15 @@ void MainWindow::make_panels() {
         send_pointer();
       },
       [this](const std::string& tool) { take_tool(tool); });
-  dock(tr("Tool"), "tool_panel", properties_, Qt::RightDockWidgetArea);
+  QDockWidget* tool = dock(tr("Tool"), "tool_panel", properties_, Qt::RightDockWidgetArea);
   QDockWidget* gauges = dock(tr("Gauges"), "gauges_panel", gauges_, Qt::RightDockWidgetArea);
   QDockWidget* clipping = dock(tr("Clipping"), "clipping_panel", clipping_, Qt::RightDockWidgetArea);
   QDockWidget* connections = dock(tr("Connections"), "connection_panel",
                                   new ConnectionPanel([this] { return this->connections(); }), Qt::RightDockWidgetArea);
-  // One above the other, four panels would show little of each.
+  // One above the other, four panels would show little of each. Three tabs beside each other would cut their titles.
+  tabifyDockWidget(tool, clipping);
+  tabifyDockWidget(gauges, connections);
   for (QDockWidget* panel : {clipping, connections}) {
-    tabifyDockWidget(gauges, panel);
     panel->hide();
     connect(panel->toggleViewAction(), &QAction::triggered, panel, [panel](bool on) {
       if (on) panel->raise();

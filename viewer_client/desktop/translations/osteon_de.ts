@@ -407,10 +407,6 @@
         <source>Pelvis, a phantom</source>
         <translation>Becken, Phantom</translation>
     </message>
-    <message>
-        <source>%1, %2</source>
-        <translation>%1, %2</translation>
-    </message>
 </context>
 <context>
     <name>MainWindow</name>
