@@ -1098,6 +1098,17 @@
     </message>
 </context>
 <context>
+    <name>QTabBar</name>
+    <message>
+        <source>Scroll Left</source>
+        <translation>Nach links blättern</translation>
+    </message>
+    <message>
+        <source>Scroll Right</source>
+        <translation>Nach rechts blättern</translation>
+    </message>
+</context>
+<context>
     <name>RiskGauge</name>
     <message>
         <source>Distance to the nearest structure at risk</source>
@@ -1353,6 +1364,18 @@
     <message>
         <source>right acetabular cartilage</source>
         <translation>rechter Pfannenknorpel</translation>
+    </message>
+    <message>
+        <source>acetabular opening</source>
+        <translation>Pfannenöffnung</translation>
+    </message>
+    <message>
+        <source>left acetabular opening</source>
+        <translation>linke Pfannenöffnung</translation>
+    </message>
+    <message>
+        <source>right acetabular opening</source>
+        <translation>rechte Pfannenöffnung</translation>
     </message>
     <message>
         <source>femoral artery</source>
