@@ -92,7 +92,6 @@ class Screen:
         bus = household.start("dbus-daemon", ["dbus-daemon", "--session", "--nofork", "--print-address"],
                               self.environment)
         self.environment["DBUS_SESSION_BUS_ADDRESS"] = bus.next_line(20.0) or ""
-        household.start("at-spi-bus-launcher", [LAUNCHER, "--launch-immediately"], self.environment)
 
     def pixels(self):
         """(width, height, RGB bytes) of what the screen shows, with the mouse's arrow."""
@@ -194,7 +193,8 @@ class Hands:
 
 
 class Eyes:
-    """Reads a program's window. A node is the (bus name, path) of a part of it."""
+    """Reads a program's window. A node is the (bus name, path) of a part of it. Made before the program starts, because
+    the first question starts the accessibility bus."""
 
     SHOWING = 1 << 25
     ACCESSIBLE = "org.a11y.atspi.Accessible"
