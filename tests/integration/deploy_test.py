@@ -251,6 +251,32 @@ class Packages(unittest.TestCase):
         self.assertEqual(components.depends(about, known), ["c", "x"])
 
 
+class Film(unittest.TestCase):
+    """Filmed is only where all is there. The film itself is for a quiet machine with the packages."""
+
+    def refused(self, programs, path):
+        with tempfile.TemporaryDirectory() as folder:
+            done = ended([ROOT / "tests/packages/film", "--bin", programs, Path(folder, "film")],
+                         env={**os.environ, "PATH": str(path)})
+            self.assertEqual((done.returncode, done.stdout, os.listdir(folder)), (1, "", []))
+        return done.stderr
+
+    def test_needs_the_programs(self):
+        with tempfile.TemporaryDirectory() as empty:
+            self.assertRegex(self.refused(empty, os.environ["PATH"]),
+                             r"\Afilm: there is no osteon in .*--bin FOLDER\n\Z")
+
+    def test_needs_a_screen_and_hands(self):
+        with tempfile.TemporaryDirectory() as folder:
+            for missing, package in (("Xvfb", "xvfb"), ("xdotool", "xdotool")):
+                for name in ("Xvfb", "openbox", "xdotool", "dbus-daemon"):
+                    program = Path(folder, name)
+                    program.touch(mode=0o755)
+                Path(folder, missing).unlink()
+                self.assertEqual(self.refused(BIN, folder),
+                                 f"film: the package {package} is not installed; apt-get install {package}\n")
+
+
 class Desktop(unittest.TestCase):
     def setUp(self):
         self.folder = ROOT / "deploy/desktop"

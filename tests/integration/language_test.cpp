@@ -5,6 +5,7 @@
 #include <QAbstractButton>
 #include <QAction>
 #include <QComboBox>
+#include <QDateTime>
 #include <QDockWidget>
 #include <QGroupBox>
 #include <QHeaderView>
@@ -30,13 +31,17 @@
 #include <memory>
 #include <set>
 #include <string>
+#include <string_view>
 #include <vector>
 
+#include "common/phantoms/phantom_bone.hpp"
 #include "tests/integration/desk.hpp"
 #include "viewer_client/desktop/bone_view.hpp"
 #include "viewer_client/desktop/language.hpp"
+#include "viewer_client/desktop/library.hpp"
 #include "viewer_client/desktop/main_window.hpp"
 #include "viewer_client/desktop/menu_keys.hpp"
+#include "viewer_client/desktop/structure_names.hpp"
 #include "viewer_client/scene/tool_groups.hpp"
 
 namespace osteon {
@@ -161,8 +166,11 @@ Faults unreachable(const QMenuBar& bar) {
   return faults;
 }
 
+// Of a label with a name, a screen reader reads that instead of the text.
 Faults nameless(const QWidget& window) {
   Faults faults;
+  for (const auto* label : visible<QLabel>(window))
+    if (!label->text().isEmpty() && !label->accessibleName().isEmpty()) faults.push_back(called(*label) + " is unread");
   for (const auto* button : visible<QAbstractButton>(window))
     if (button->text().isEmpty() && button->accessibleName().isEmpty()) faults.push_back(called(*button));
   return faults;
@@ -243,6 +251,16 @@ class LanguageTest : public testing::Test {
     const auto* device = window_->findChild<QLabel*>("device");
     ASSERT_TRUE(until([&] { return device->text() == QCoreApplication::translate("MainWindow", "Pointer"); }));
   }
+  // A session with the longest title among those of the examples.
+  static void remember_session() {
+    RecentEntry entry;
+    for (const ExampleBone& bone : example_bones())
+      if (bone.title.size() > entry.name.size()) entry.name = bone.title;
+    entry.bone = desk_->bone();
+    entry.session = desk_->temp().path() / "session";
+    entry.opened = QDateTime({2026, 11, 30}, {23, 59, 59});
+    remember(entry);
+  }
   void expect_whole(const std::string& where) {
     QCoreApplication::sendPostedEvents();  // a text that has just changed asks for another width
     EXPECT_THAT(clipped(*window_), IsEmpty()) << where;
@@ -278,7 +296,11 @@ std::unique_ptr<Desk> LanguageTest::desk_;
 TEST_F(LanguageTest, TheStartPageIsWholeInBothLanguages) {
   std::map<std::string, std::set<QString>> seen;
   for (const char* language : {"en", "de"}) {
+    speak(language);
+    remember_session();
     open_window(language);
+    const auto* recent = window_->findChild<QListWidget*>("recent");
+    ASSERT_EQ(recent->count(), 1);
     expect_whole(language);
     seen[language] = texts(*window_);
   }
@@ -326,6 +348,31 @@ TEST_F(LanguageTest, TourSoundAndConnectionsAreWholeInBothLanguages) {
     window_->findChild<QAction*>("connections")->trigger();
   }
   EXPECT_THAT(untranslated(seen["en"], seen["de"]), IsEmpty());
+}
+
+// What Osteon itself names: planned axes and structures at risk of its phantoms.
+TEST_F(LanguageTest, NamesOfPhantomsAreTranslated) {
+  speak("de");
+  int names = 0;
+  const auto expect_german = [&](const std::string& name) {
+    ++names;
+    const QStringList english = QString::fromStdString(name).split(", "), german = structure_title(name).split(", ");
+    ASSERT_EQ(english.size(), german.size());
+    for (int part = 0; part < english.size(); ++part)
+      EXPECT_NE(english[part].toStdString(), german[part].toStdString()) << name;
+  };
+  for (const std::string_view kind : phantoms::kBoneKinds) {
+    phantoms::BoneRecipe recipe;
+    recipe.kind = kind;
+    const auto bone = phantoms::make_bone(recipe);
+    ASSERT_TRUE(bone) << kind;
+    for (const PlannedAxis& axis : (*bone)->anatomy().axes) expect_german(axis.name);
+    for (const phantoms::Structure& structure : (*bone)->structures()) expect_german(structure.name);
+  }
+  EXPECT_GT(names, 30);
+  EXPECT_EQ(structure_title("my own structure"), "my own structure");
+  speak("en");
+  EXPECT_EQ(structure_title("femur, mechanical axis"), "femur, mechanical axis");
 }
 
 TEST_F(LanguageTest, ShortCutsAreTheSameInBothLanguages) {
@@ -442,6 +489,10 @@ TEST_F(LanguageTest, NamelessAndUntranslatedTextsAreNoticed) {
   EXPECT_THAT(nameless(window), SizeIs(1));
   button->setAccessibleName("Bohrer");
   EXPECT_THAT(nameless(window), IsEmpty());
+  auto* label = new QLabel("2,5 mm", &window);
+  EXPECT_THAT(nameless(window), IsEmpty());
+  label->setAccessibleName("Tiefe");
+  EXPECT_THAT(nameless(window), SizeIs(1));
   EXPECT_THAT(untranslated({"Depth", "5 N", "Osteon"}, {"Depth", "5 N", "Osteon"}), SizeIs(1));
 }
 

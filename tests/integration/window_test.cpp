@@ -33,6 +33,7 @@
 #include <memory>
 #include <sstream>
 #include <string>
+#include <tuple>
 #include <vector>
 
 #include "tests/integration/window_bench.hpp"
@@ -288,9 +289,9 @@ TEST_F(WindowTest, AnOpenedBoneIsPointedAtWhereItIsSeen) {
   click_tool("drill");
   hover(middle() - QPoint(60, 0));
   EXPECT_TRUE(until([&] { return view_->pointer().on_bone(); }));
-  auto* panel = window_->findChild<QWidget*>("clipping_panel");
+  auto* panel = window_->findChild<QDockWidget*>("clipping_panel");
   ASSERT_NE(panel, nullptr);
-  panel->show();
+  panel->toggleViewAction()->trigger();
   // From above, with the front of the body up, the patient's left side is on the left.
   window_->findChild<QSlider*>("clip_left")->setValue(100);
   window_->findChild<QCheckBox*>("clip_box")->setChecked(true);
@@ -302,6 +303,22 @@ TEST_F(WindowTest, AnOpenedBoneIsPointedAtWhereItIsSeen) {
   hover(middle() - QPoint(60, 0));
   EXPECT_TRUE(view_->pointer().on_bone());
   panel->hide();  // the next window opens as this one was left
+}
+
+// Also beside each other, from the first row to the last.
+TEST_F(WindowTest, APanelThatIsOpenedIsSeenAsAWhole) {
+  QSettings().remove("window/state");
+  begin();
+  const auto seen = [&](const char* part) {
+    const auto* widget = window_->findChild<QWidget*>(part);
+    return widget != nullptr && widget->visibleRegion().boundingRect() == widget->rect();
+  };
+  for (const auto& [panel, first, last] : {std::tuple{"clipping_panel", "clip_box", "clip_whole"},
+                                           std::tuple{"connection_panel", "link_room", "link_advice"}}) {
+    window_->findChild<QDockWidget*>(panel)->toggleViewAction()->trigger();
+    EXPECT_TRUE(until([&] { return seen(first) && seen(last); }, 5s)) << panel;
+  }
+  for (const char* panel : {"clipping_panel", "connection_panel"}) window_->findChild<QDockWidget*>(panel)->hide();
 }
 
 // A tibia with an artery. The status bar names what is nearest to the tip, and warns below the chosen distance.
@@ -542,6 +559,14 @@ TEST_F(WindowTest, TheTourIsLedAndEndedByTheKeyboard) {
   examples->setFocus();
   QTest::keyClick(examples, Qt::Key_Escape);
   EXPECT_FALSE(tour->isVisible());
+  // One key ends it and puts the tool down.
+  open();
+  click_tool("drill");
+  trigger("tour_again");
+  view_->setFocus();
+  QTest::keyClick(view_, Qt::Key_Escape);
+  EXPECT_FALSE(tour->isVisible());
+  EXPECT_FALSE(view_->holding());
 }
 
 TEST_F(WindowTest, AKilledHapticClientComesBackAndCutsAgain) {

@@ -12,6 +12,8 @@
 #include <vtkNew.h>
 #include <vtkRenderWindowInteractor.h>
 
+#include "viewer_client/desktop/structure_names.hpp"
+
 namespace osteon {
 
 namespace {
@@ -50,6 +52,7 @@ void BoneView::show_room(RenderQueue* queue, const Box& bounds) {
   makeCurrent();
   scene_.reset();
   scene_ = std::make_unique<BoneScene>(*renderWindow());
+  scene_->name_axes([](const std::string& name) { return structure_title(name).toStdString(); });
   scene_->show_marker(marker_);
   scene_->show_planned(planned_);
   scene_->show_risks(risks_);

@@ -132,7 +132,6 @@ ConnectionPanel::ConnectionPanel(std::function<ConnectionState()> state, QWidget
 QLabel* ConnectionPanel::add_row(QFormLayout& form, const QString& what, const char* name) {
   auto* value = new QLabel(QString("–"));
   value->setObjectName(name);
-  value->setAccessibleName(what);
   value->setWordWrap(true);
   value->setTextFormat(Qt::PlainText);
   value->setTextInteractionFlags(Qt::TextSelectableByMouse);
@@ -140,6 +139,7 @@ QLabel* ConnectionPanel::add_row(QFormLayout& form, const QString& what, const c
   QFont bold = title->font();
   bold.setBold(true);
   title->setFont(bold);
+  title->setBuddy(value);  // names it for screen readers, which then read its value too
   form.addRow(title, value);
   return value;
 }

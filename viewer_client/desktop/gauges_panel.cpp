@@ -80,8 +80,7 @@ GaugesPanel::GaugesPanel(QWidget* parent) : QWidget(parent) {
     QFont font = value->font();
     font.setPointSizeF(1.2 * font.pointSizeF());
     value->setFont(font);
-    value->setAccessibleName(what);
-    form->addRow(what, value);
+    form->addRow(what, value);  // names it for screen readers, which then read its value too
     return value;
   };
   push_ = gauge(tr("Push"), "push");

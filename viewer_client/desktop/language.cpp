@@ -30,7 +30,9 @@ constexpr const char* kTranslators = "osteon_translators";
     QT_TRANSLATE_NOOP("QDockWidget", "Float"),
     QT_TRANSLATE_NOOP("QDockWidget", "Undocks and re-attaches the dock widget"),
     QT_TRANSLATE_NOOP("QDockWidget", "Close"),
-    QT_TRANSLATE_NOOP("QDockWidget", "Closes the dock widget")};
+    QT_TRANSLATE_NOOP("QDockWidget", "Closes the dock widget"),
+    QT_TRANSLATE_NOOP("QTabBar", "Scroll Left"),
+    QT_TRANSLATE_NOOP("QTabBar", "Scroll Right")};
 
 void add_translator(QObject* owner, const QString& file, const QString& folder) {
   auto* translator = new QTranslator(owner);

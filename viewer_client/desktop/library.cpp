@@ -115,9 +115,9 @@ std::vector<RecentEntry> recent_entries() {
   std::erase_if(entries, [](const RecentEntry& entry) { return !is_case(entry.bone); });
   for (RecentEntry& entry : entries)
     if (entry.opened.isValid())
-      entry.title = QCoreApplication::translate("Library", "%1, %2")
-                        .arg(entry.name.isEmpty() ? case_title(entry.bone) : entry.name,
-                             QLocale().toString(entry.opened, QLocale::ShortFormat));
+      // In one line, the list would cut off the time.
+      entry.title = (entry.name.isEmpty() ? case_title(entry.bone) : entry.name) + '\n' +
+                    QLocale().toString(entry.opened, QLocale::ShortFormat);
   return entries;
 }
 

@@ -153,12 +153,20 @@ void MainWindow::make_panels() {
         send_pointer();
       },
       [this](const std::string& tool) { take_tool(tool); });
-  dock(tr("Tool"), "tool_panel", properties_, Qt::RightDockWidgetArea);
-  dock(tr("Gauges"), "gauges_panel", gauges_, Qt::RightDockWidgetArea);
-  dock(tr("Clipping"), "clipping_panel", clipping_, Qt::RightDockWidgetArea)->hide();
+  QDockWidget* tool = dock(tr("Tool"), "tool_panel", properties_, Qt::RightDockWidgetArea);
+  QDockWidget* gauges = dock(tr("Gauges"), "gauges_panel", gauges_, Qt::RightDockWidgetArea);
+  QDockWidget* clipping = dock(tr("Clipping"), "clipping_panel", clipping_, Qt::RightDockWidgetArea);
   QDockWidget* connections = dock(tr("Connections"), "connection_panel",
                                   new ConnectionPanel([this] { return this->connections(); }), Qt::RightDockWidgetArea);
-  connections->hide();
+  // One above the other, four panels would show little of each. Three tabs beside each other would cut their titles.
+  tabifyDockWidget(tool, clipping);
+  tabifyDockWidget(gauges, connections);
+  for (QDockWidget* panel : {clipping, connections}) {
+    panel->hide();
+    connect(panel->toggleViewAction(), &QAction::triggered, panel, [panel](bool on) {
+      if (on) panel->raise();
+    });
+  }
   connections->toggleViewAction()->setObjectName("connections");
   connections->toggleViewAction()->setShortcut(QKeySequence("Ctrl+Shift+N"));
 }
@@ -627,10 +635,11 @@ ConnectionState MainWindow::connections() {
   return state;
 }
 
-void MainWindow::keyPressEvent(QKeyEvent* event) {
-  // Reached where no part of the window has a use for Escape.
-  if (event->key() == Qt::Key_Escape) return tour_->end();
-  QMainWindow::keyPressEvent(event);
+bool MainWindow::event(QEvent* event) {
+  // Before any short cut or part of the window has the key, which also puts the tool down.
+  if (event->type() == QEvent::ShortcutOverride && static_cast<QKeyEvent*>(event)->key() == Qt::Key_Escape)
+    tour_->end();
+  return QMainWindow::event(event);
 }
 
 void MainWindow::showEvent(QShowEvent* event) {

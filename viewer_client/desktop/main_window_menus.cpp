@@ -113,7 +113,6 @@ void MainWindow::make_tools_menu() {
   add_action(
       tools, tr("&Put the tool down"), "put_down", Qt::Key_Escape,
       [this] {
-        if (!view_->holding() && !view_->placing()) tour_->end();
         put_tool_down();
         say(tr("Choose a tool on the left, then hold the left button on the bone."));
       },

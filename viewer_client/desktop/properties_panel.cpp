@@ -41,7 +41,8 @@ PropertiesPanel::PropertiesPanel(std::function<void(const Chosen&)> changed,
   form_ = new QFormLayout(this);
   const auto row = [&](const QString& what, const char* name, QWidget* widget) {
     widget->setObjectName(name);
-    widget->setAccessibleName(what);
+    // A screen reader would read the name of a label instead of its text. The row names it too.
+    if (qobject_cast<QLabel*>(widget) == nullptr) widget->setAccessibleName(what);
     form_->addRow(what, widget);
   };
   size_ = new QComboBox;

@@ -4,6 +4,8 @@
 #include <QSettings>
 #include <utility>
 
+#include "viewer_client/desktop/structure_names.hpp"
+
 namespace osteon {
 
 namespace {
@@ -16,7 +18,7 @@ constexpr const char* kWarning = "QLabel { background: #e69f00; color: black; fo
 }  // namespace
 
 RiskGauge::RiskGauge(QWidget* parent) : QLabel(parent) {
-  setAccessibleName(tr("Distance to the nearest structure at risk"));
+  setAccessibleDescription(tr("Distance to the nearest structure at risk"));
   limit_mm_ = QSettings().value(kLimitKey, kUsualLimit_mm).toDouble();
   hide();
 }
@@ -41,7 +43,7 @@ void RiskGauge::show_tip(const std::optional<Vec3>& tip_mm) {
     clear();
     return;
   }
-  const QString whole = QString::fromStdString(plan_->structures[found->structure].name);
+  const QString whole = structure_title(plan_->structures[found->structure].name);
   const QString name = fontMetrics().elidedText(whole, Qt::ElideRight, kNameWidth_px);
   const QString distance = QLocale().toString(found->distance_mm, 'f', 1);
   const bool warns = found->distance_mm < limit_mm_;

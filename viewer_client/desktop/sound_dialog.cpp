@@ -97,7 +97,6 @@ SoundDialog::SoundDialog(const Chosen& chosen, std::function<void(const Chosen&)
   const auto row = [&](const QString& what, const char* name) {
     auto* value = new QLabel(QString("–"));
     value->setObjectName(name);
-    value->setAccessibleName(what);
     form->addRow(what, value);
     return value;
   };

@@ -132,7 +132,7 @@ void Tour::place() {
 bool Tour::event(QEvent* event) {
   const bool key = event->type() == QEvent::ShortcutOverride || event->type() == QEvent::KeyPress;
   if (key && static_cast<QKeyEvent*>(event)->key() == Qt::Key_Escape) {
-    // The window's own Escape puts the tool down. Within the card it ends the tour.
+    // The window's own Escape also puts the tool down. Within the card it only ends the tour.
     event->accept();
     if (event->type() == QEvent::KeyPress) end();
     return true;

@@ -38,8 +38,8 @@ constexpr std::array<Colour, 3> kPieces{{{214, 226, 200}, {200, 214, 236}, {236,
 
 // Cut faces by density. Between the densities of cancellous bone and of cortex the colours are mixed.
 const Vec3f kCutCortex{240.0f, 214.0f, 184.0f};  // pale
-const Vec3f kStruts{226.0f, 168.0f, 134.0f};     // trabeculae
-const Vec3f kPores{122.0f, 44.0f, 38.0f};        // marrow between them
+const Vec3f kStruts{233.0f, 198.0f, 162.0f};     // trabeculae
+const Vec3f kPores{156.0f, 96.0f, 74.0f};        // marrow between them: brownish, because no blood is simulated
 constexpr float kCancellous_g_cm3 = 0.7f, kCortex_g_cm3 = 1.4f;
 constexpr float kPore_mm = 1.3f;      // distance of pores [A]
 constexpr float kSolid_g_cm3 = 1.9f;  // without pores

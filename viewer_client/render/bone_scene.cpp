@@ -124,6 +124,10 @@ CameraView BoneScene::camera() const { return view_of(*impl_->renderer->GetActiv
 
 void BoneScene::show_plan(const SurgicalPlan& plan) { impl_->plan->show(plan); }
 
+void BoneScene::name_axes(std::function<std::string(const std::string&)> written) {
+  impl_->plan->name_axes(std::move(written));
+}
+
 void BoneScene::show_planned(bool on) { impl_->plan->set_planned(on); }
 
 void BoneScene::show_risks(bool on) { impl_->plan->set_risks(on); }

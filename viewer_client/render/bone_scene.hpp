@@ -3,6 +3,7 @@
 // the rest of the program. All functions: [render], the thread that owns the window.
 #pragma once
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
@@ -63,6 +64,8 @@ class BoneScene {
 
   // What is planned, and the structures at risk. Nothing of it is drawn before show_planned() and show_risks().
   void show_plan(const SurgicalPlan& plan);
+  // How the names of axes are written from the next plan on, UTF-8; at first as they are.
+  void name_axes(std::function<std::string(const std::string&)> written);
   // Axes, planes and regions, through the bone too.
   void show_planned(bool on);
   // Structures at risk: translucent before the bone, and fainter behind it.

@@ -98,6 +98,7 @@ struct PlanActors::Impl {
   std::vector<Drawn> planned, risks;
   std::vector<Axis> axes;
   bool planned_on = false, risks_on = false;
+  std::function<std::string(const std::string&)> written;
 
   Impl(const BonePictures& pictures, vtkRenderWindow& in) : bone(*pictures.left), window(in), layer(in, pictures) {}
   Impl(const Impl&) = delete;
@@ -153,7 +154,7 @@ void PlanActors::Impl::add_axis(const SurgicalPlan::Axis& axis, const Box& aroun
   made.tube->CappingOn();
   add_planned(made.tube->GetOutputPort(), 1.0);
   made.name = vtkSmartPointer<vtkTextActor>::New();
-  made.name->SetInput(axis.name.c_str());
+  made.name->SetInput((written ? written(axis.name) : axis.name).c_str());
   made.name->GetPositionCoordinate()->SetCoordinateSystemToWorld();
   made.name->GetPositionCoordinate()->SetValue(made.to_mm.x(), made.to_mm.y(), made.to_mm.z());
   vtkTextProperty* text = made.name->GetTextProperty();
@@ -226,6 +227,10 @@ void PlanActors::show(const SurgicalPlan& plan) {
     }
   for (const Impl::Axis& axis : impl_->axes) impl_->layer.add(axis.name);
   impl_->apply();
+}
+
+void PlanActors::name_axes(std::function<std::string(const std::string&)> written) {
+  impl_->written = std::move(written);
 }
 
 void PlanActors::set_planned(bool on) {

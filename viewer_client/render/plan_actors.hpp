@@ -1,7 +1,9 @@
 // Draws what is planned and the structures at risk. All functions: [render], the thread that opened the window.
 #pragma once
 #include <cstdint>
+#include <functional>
 #include <memory>
+#include <string>
 
 #include "common/surface/surgical_plan.hpp"
 #include "viewer_client/render/layer_above.hpp"
@@ -20,6 +22,8 @@ class PlanActors {
   ~PlanActors();
 
   void show(const SurgicalPlan& plan);
+  // How names are written from the next plan on, UTF-8; at first as they are.
+  void name_axes(std::function<std::string(const std::string&)> written);
   // Both are off at first.
   void set_planned(bool on);
   void set_risks(bool on);

@@ -176,6 +176,27 @@ TEST_F(BonePicture, ACutFaceIsPaleInCortexAndPorousInCancellousBone) {
   }
 }
 
+// Marrow of adult limbs is yellow and brown, and no blood is simulated. So a cut face is warmer and darker than the
+// outer face, and not red: blood and muscle have more than twice as much red as green.
+TEST_F(BonePicture, ACutFaceThroughCancellousBoneIsBrownAndNotRed) {
+  const auto mean_colour = [&](std::uint8_t cut) {
+    window_->scene().show_region(kHere, sphere_mesh(Vec3::Zero(), 15.0, cut, 120));
+    const Image image = drawn();
+    Vec3 sum = Vec3::Zero();
+    for (int x = -25; x < 25; ++x)
+      for (int y = -25; y < 25; ++y) sum += colour(image, kWidth / 2 + x, kHeight / 2 + y);
+    return Vec3(sum / (50.0 * 50.0));
+  };
+  const Vec3 outer = mean_colour(0);
+  for (const double g_cm3 : {0.1, 0.2, 0.3, 0.5, 0.7}) {
+    window_->scene().set_density(two_halves(g_cm3, g_cm3));
+    const Vec3 cut = mean_colour(1);
+    EXPECT_LT(cut.x() / cut.y(), 1.7) << g_cm3;
+    EXPECT_GT(cut.x() / cut.y(), 1.15 * outer.x() / outer.y()) << g_cm3;
+    EXPECT_GT((outer - cut).norm(), 60.0) << g_cm3;
+  }
+}
+
 // Pores stay where they are in the bone, whatever the triangles are.
 TEST_F(BonePicture, TheTextureOfACutIsFixedInTheBone) {
   window_->scene().set_density(two_halves(0.5, 0.5));

@@ -241,6 +241,22 @@ TEST_F(ScenePicture, APlannedAxisIsALineThroughTheBone) {
   EXPECT_EQ(differing_pixels(drawn(), bare_), 0);
 }
 
+TEST_F(ScenePicture, TheNameOfAnAxisIsWrittenAsTheWindowSays) {
+  SurgicalPlan plan;
+  plan.axes = {{"i", Vec3(4, 0, 0), Vec3::UnitZ()}};
+  scene().look(from_front(160.0));
+  scene().show_planned(true);
+  scene().show_plan(plan);
+  const Image as_it_is = drawn();
+  scene().name_axes([](const std::string& name) { return "Äußere Achse " + name; });
+  scene().show_plan(plan);
+  EXPECT_GT(differing_pixels(drawn(), as_it_is), 300);
+  scene().name_axes({});
+  scene().show_plan(plan);
+  EXPECT_EQ(differing_pixels(drawn(), as_it_is), 0);
+  scene().show_planned(false);
+}
+
 // Viewing the colours as a person without one kind of cones does (Viénot 1999), every two kinds still differ.
 TEST(StructureColours, DifferForColourBlindPeople) {
   const auto linear = [](std::uint32_t colour, int shift) { return std::pow((colour >> shift & 255) / 255.0, 2.2); };

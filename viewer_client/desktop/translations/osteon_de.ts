@@ -407,10 +407,6 @@
         <source>Pelvis, a phantom</source>
         <translation>Becken, Phantom</translation>
     </message>
-    <message>
-        <source>%1, %2</source>
-        <translation>%1, %2</translation>
-    </message>
 </context>
 <context>
     <name>MainWindow</name>
@@ -1102,6 +1098,17 @@
     </message>
 </context>
 <context>
+    <name>QTabBar</name>
+    <message>
+        <source>Scroll Left</source>
+        <translation>Nach links blättern</translation>
+    </message>
+    <message>
+        <source>Scroll Right</source>
+        <translation>Nach rechts blättern</translation>
+    </message>
+</context>
+<context>
     <name>RiskGauge</name>
     <message>
         <source>Distance to the nearest structure at risk</source>
@@ -1282,6 +1289,141 @@
     <message>
         <source>Open an .osteon file, or the case.json of a folder</source>
         <translation>Öffnet eine .osteon-Datei oder die case.json eines Ordners</translation>
+    </message>
+</context>
+<context>
+    <name>Structures</name>
+    <message>
+        <source>femur</source>
+        <translation>Femur</translation>
+    </message>
+    <message>
+        <source>tibia</source>
+        <translation>Tibia</translation>
+    </message>
+    <message>
+        <source>patella</source>
+        <translation>Patella</translation>
+    </message>
+    <message>
+        <source>pelvis</source>
+        <translation>Becken</translation>
+    </message>
+    <message>
+        <source>mechanical axis</source>
+        <translation>mechanische Achse</translation>
+    </message>
+    <message>
+        <source>anatomical axis</source>
+        <translation>anatomische Achse</translation>
+    </message>
+    <message>
+        <source>neck axis</source>
+        <translation>Schenkelhalsachse</translation>
+    </message>
+    <message>
+        <source>transepicondylar axis</source>
+        <translation>transepikondyläre Achse</translation>
+    </message>
+    <message>
+        <source>posterior condylar axis</source>
+        <translation>hintere Kondylenachse</translation>
+    </message>
+    <message>
+        <source>plateau slope</source>
+        <translation>Neigung des Plateaus</translation>
+    </message>
+    <message>
+        <source>patellar ridge</source>
+        <translation>Patellafirst</translation>
+    </message>
+    <message>
+        <source>femoral head cartilage</source>
+        <translation>Hüftkopfknorpel</translation>
+    </message>
+    <message>
+        <source>femoral condyle cartilage</source>
+        <translation>Kondylenknorpel</translation>
+    </message>
+    <message>
+        <source>patellar cartilage</source>
+        <translation>Patellaknorpel</translation>
+    </message>
+    <message>
+        <source>tibial cartilage</source>
+        <translation>Tibiaknorpel</translation>
+    </message>
+    <message>
+        <source>acetabular cartilage</source>
+        <translation>Pfannenknorpel</translation>
+    </message>
+    <message>
+        <source>left acetabular cartilage</source>
+        <translation>linker Pfannenknorpel</translation>
+    </message>
+    <message>
+        <source>right acetabular cartilage</source>
+        <translation>rechter Pfannenknorpel</translation>
+    </message>
+    <message>
+        <source>acetabular opening</source>
+        <translation>Pfannenöffnung</translation>
+    </message>
+    <message>
+        <source>left acetabular opening</source>
+        <translation>linke Pfannenöffnung</translation>
+    </message>
+    <message>
+        <source>right acetabular opening</source>
+        <translation>rechte Pfannenöffnung</translation>
+    </message>
+    <message>
+        <source>femoral artery</source>
+        <translation>Arteria femoralis</translation>
+    </message>
+    <message>
+        <source>popliteal artery</source>
+        <translation>Arteria poplitea</translation>
+    </message>
+    <message>
+        <source>anterior tibial artery</source>
+        <translation>Arteria tibialis anterior</translation>
+    </message>
+    <message>
+        <source>sciatic nerve</source>
+        <translation>Nervus ischiadicus</translation>
+    </message>
+    <message>
+        <source>tibial nerve</source>
+        <translation>Nervus tibialis</translation>
+    </message>
+    <message>
+        <source>common peroneal nerve</source>
+        <translation>Nervus fibularis communis</translation>
+    </message>
+    <message>
+        <source>anterior cruciate ligament</source>
+        <translation>vorderes Kreuzband</translation>
+    </message>
+    <message>
+        <source>posterior cruciate ligament</source>
+        <translation>hinteres Kreuzband</translation>
+    </message>
+    <message>
+        <source>medial collateral ligament</source>
+        <translation>Innenband</translation>
+    </message>
+    <message>
+        <source>lateral collateral ligament</source>
+        <translation>Außenband</translation>
+    </message>
+    <message>
+        <source>patellar ligament</source>
+        <translation>Patellarsehne</translation>
+    </message>
+    <message>
+        <source>fibula</source>
+        <translation>Fibula</translation>
     </message>
 </context>
 <context>
