@@ -49,10 +49,9 @@ void PatchBuilder::changed(double pitch_mm, int level, const std::vector<Coord>&
   for (const Coord& origin : leaf_origins) {
     const auto forget = [&](Store& store, int of_level) {
       if (store.empty()) return;
-      // Samples of a finer level are interpolated between the leaf's and those beside it. Others are the leaf's own.
-      const std::int32_t beside = of_level > level ? 1 : 0, last = kLeafSize - 1 + beside;
-      const Box box{position_mm(origin - Coord{beside, beside, beside}, leaf_pitch),
-                    position_mm(origin + Coord{last, last, last}, leaf_pitch)};
+      // Finer samples are interpolated up to the next leaf. They lie in bricks that hold samples of this one too.
+      const Box box{position_mm(origin, leaf_pitch),
+                    position_mm(origin + Coord{kLeafSize - 1, kLeafSize - 1, kLeafSize - 1}, leaf_pitch)};
       const double pitch = level_pitch_mm(pitch_mm, of_level);
       CoordBox bricks = bricks_in(box, pitch);
       // The apron of the brick below also holds these samples.
