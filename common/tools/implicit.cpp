@@ -14,19 +14,33 @@ namespace {
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kSameCorner_mm = 1e-6;
 
+// An edge of a flat convex polygon, counter-clockwise.
+struct PolygonEdge {
+  Vec3 from, along, out;  // `out` points out of the polygon, in its plane
+  double squared_length;
+};
+
 // Distance to a flat convex polygon from a point on the outer side of its plane.
-double polygon_distance(const std::vector<Vec3>& corners, const Vec3& normal, double height_mm, const Vec3& p) {
+double polygon_distance(const std::vector<PolygonEdge>& edges, double height_mm, const Vec3& p) {
   bool above = true;
   double squared = kInfinity;
-  for (std::size_t i = 0; i < corners.size(); ++i) {
-    const Vec3 &a = corners[i], &b = corners[(i + 1) % corners.size()];
-    const Vec3 edge = b - a, from = p - a;
-    if (edge.cross(normal).dot(from) <= 0.0) continue;  // on the inner side of this edge
+  for (const PolygonEdge& edge : edges) {
+    const Vec3 from = p - edge.from;
+    if (edge.out.dot(from) <= 0.0) continue;  // on the inner side of this edge
     above = false;
-    const double t = std::clamp(from.dot(edge) / edge.squaredNorm(), 0.0, 1.0);
-    squared = std::min(squared, (from - t * edge).squaredNorm());
+    const double t = std::clamp(from.dot(edge.along) / edge.squared_length, 0.0, 1.0);
+    squared = std::min(squared, (from - t * edge.along).squaredNorm());
   }
   return above ? height_mm : std::sqrt(squared);
+}
+
+std::vector<PolygonEdge> edges_of(const std::vector<Vec3>& corners, const Vec3& normal) {
+  std::vector<PolygonEdge> edges;
+  for (std::size_t i = 0; i < corners.size(); ++i) {
+    const Vec3 along = corners[(i + 1) % corners.size()] - corners[i];
+    edges.push_back({corners[i], along, along.cross(normal), along.squaredNorm()});
+  }
+  return edges;
 }
 
 }  // namespace
@@ -129,10 +143,12 @@ Box box_of(const std::vector<std::vector<Vec3>>& polygons) {
 }
 
 Implicit convex(std::vector<HalfSpace> faces) {
-  auto polygons = face_polygons(faces);
+  const auto polygons = face_polygons(faces);
   const Box bounds = box_of(polygons);
   OSTEON_CHECK(!bounds.empty());
-  return {[faces = std::move(faces), polygons = std::move(polygons)](const Vec3& p) {
+  std::vector<std::vector<PolygonEdge>> edges;
+  for (std::size_t i = 0; i < faces.size(); ++i) edges.push_back(edges_of(polygons[i], faces[i].normal));
+  return {[faces = std::move(faces), edges = std::move(edges)](const Vec3& p) {
             double inside = -kInfinity;
             for (const HalfSpace& face : faces) inside = std::max(inside, face.normal.dot(p) - face.offset_mm);
             if (inside <= 0.0) return inside;
@@ -140,8 +156,8 @@ Implicit convex(std::vector<HalfSpace> faces) {
             double nearest = kInfinity;
             for (std::size_t i = 0; i < faces.size(); ++i) {
               const double height = faces[i].normal.dot(p) - faces[i].offset_mm;
-              if (height <= 0.0 || height >= nearest || polygons[i].empty()) continue;
-              nearest = std::min(nearest, polygon_distance(polygons[i], faces[i].normal, height, p));
+              if (height <= 0.0 || height >= nearest || edges[i].empty()) continue;
+              nearest = std::min(nearest, polygon_distance(edges[i], height, p));
             }
             return nearest;
           },

@@ -35,6 +35,7 @@ class Grid {
     limit_ = Coord{static_cast<std::int32_t>(size.x() / cell_mm) + 2, static_cast<std::int32_t>(size.y() / cell_mm) + 2,
                    static_cast<std::int32_t>(size.z() / cell_mm) + 2};
     halve({0, 0, 0}, span);
+    values_.reserve(2 * cells_.size());
   }
 
   [[nodiscard]] const std::vector<Coord>& cells() const { return cells_; }
@@ -91,6 +92,13 @@ class Grid {
 
 constexpr std::array<Coord, 3> kSteps{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
 
+// The corners of a cell by number: one bit for each axis.
+constexpr std::size_t bit_of_axis(std::size_t axis) { return std::size_t{1} << axis; }
+constexpr Coord corner_of_cell(std::size_t number) {
+  const auto along = [number](std::size_t axis) { return number & bit_of_axis(axis) ? 1 : 0; };
+  return {along(0), along(1), along(2)};
+}
+
 // The point nearest to all planes through the crossings, starting from their middle. It does not move along directions
 // that the planes do not determine.
 Vec3 feature(const std::vector<Vec3>& points, const std::vector<Vec3>& normals) {
@@ -125,27 +133,31 @@ TriangleMesh surface_of(const Implicit& solid, double cell_mm) {
   // By the edge's lower corner and its axis.
   std::array<std::unordered_map<Coord, Crossing, CoordHash>, 3> crossings;
   std::unordered_map<Coord, std::uint32_t, CoordHash> vertex_of;
+  vertex_of.reserve(grid.cells().size());
+  std::vector<Coord> crossed;
   TriangleMesh mesh;
   std::vector<Vec3> points, normals;
   for (const Coord& cell : grid.cells()) {
+    std::array<bool, 8> inside{};
+    for (std::size_t i = 0; i < inside.size(); ++i) inside[i] = grid.inside(cell + corner_of_cell(i));
+    if (std::ranges::count(inside, inside[0]) == 8) continue;
+    crossed.push_back(cell);
     points.clear();
     normals.clear();
-    for (int axis = 0; axis < 3; ++axis) {
-      const std::size_t k = static_cast<std::size_t>(axis);
-      const Coord u = kSteps[(k + 1) % 3], v = kSteps[(k + 2) % 3];
-      for (int i = 0; i < 4; ++i) {
-        const Coord from = cell + (i & 1) * u + (i >> 1) * v, to = from + kSteps[k];
-        if (grid.inside(from) == grid.inside(to)) continue;
-        const auto [found, fresh] = crossings[k].try_emplace(from);
+    for (std::size_t k = 0; k < 3; ++k) {
+      const std::size_t along = bit_of_axis(k), u = bit_of_axis((k + 1) % 3), v = bit_of_axis((k + 2) % 3);
+      for (const std::size_t from : {std::size_t{0}, u, v, u + v}) {
+        if (inside[from] == inside[from + along]) continue;
+        const Coord at = cell + corner_of_cell(from);
+        const auto [found, fresh] = crossings[k].try_emplace(at);
         if (fresh) {
-          const Vec3 p = grid.crossing(from, to);
+          const Vec3 p = grid.crossing(at, at + kSteps[k]);
           found->second = {p, gradient(solid, p)};
         }
         points.push_back(found->second.point);
         normals.push_back(found->second.normal);
       }
     }
-    if (points.empty()) continue;
     // A vertex outside its cell could fold the surface over.
     const Vec3 low = grid.place(cell), high = grid.place(cell + Coord{1, 1, 1});
     Vec3 p = feature(points, normals).cwiseMax(low).cwiseMin(high);
@@ -156,7 +168,7 @@ TriangleMesh surface_of(const Implicit& solid, double cell_mm) {
     mesh.positions_mm.push_back({static_cast<float>(p.x()), static_cast<float>(p.y()), static_cast<float>(p.z())});
   }
   // Each crossed edge joins the vertices of its four cells, in the order of the cells, so that files are reproducible.
-  for (const Coord& cell : grid.cells())
+  for (const Coord& cell : crossed)
     for (std::size_t k = 0; k < 3; ++k) {
       if (!crossings[k].contains(cell)) continue;
       const Coord u = kSteps[(k + 1) % 3], v = kSteps[(k + 2) % 3];

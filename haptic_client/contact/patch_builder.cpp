@@ -47,11 +47,12 @@ void for_each(const CoordBox& box, const Visit& visit) {
 void PatchBuilder::changed(double pitch_mm, int level, const std::vector<Coord>& leaf_origins) {
   const double leaf_pitch = level_pitch_mm(pitch_mm, level);
   for (const Coord& origin : leaf_origins) {
-    // One more sample on every side, because interpolation reaches there.
-    const Box box{position_mm(origin - Coord{1, 1, 1}, leaf_pitch),
-                  position_mm(origin + Coord{kLeafSize, kLeafSize, kLeafSize}, leaf_pitch)};
-    const auto forget = [&](Store& store, double pitch) {
+    const auto forget = [&](Store& store, int of_level) {
       if (store.empty()) return;
+      // Finer samples are interpolated up to the next leaf. They lie in bricks that hold samples of this one too.
+      const Box box{position_mm(origin, leaf_pitch),
+                    position_mm(origin + Coord{kLeafSize - 1, kLeafSize - 1, kLeafSize - 1}, leaf_pitch)};
+      const double pitch = level_pitch_mm(pitch_mm, of_level);
       CoordBox bricks = bricks_in(box, pitch);
       // The apron of the brick below also holds these samples.
       bricks.min = bricks.min - Coord{1, 1, 1};
@@ -61,8 +62,8 @@ void PatchBuilder::changed(double pitch_mm, int level, const std::vector<Coord>&
         if ((low.array() <= box.max_mm.array()).all() && (high.array() >= box.min_mm.array()).all()) store.erase(index);
       });
     };
-    if (fine_level_ >= 0) forget(fine_, level_pitch_mm(pitch_mm, fine_level_));
-    forget(coarse_, pitch_mm);
+    if (fine_level_ >= 0) forget(fine_, fine_level_);
+    forget(coarse_, 0);
   }
 }
 
@@ -116,6 +117,17 @@ std::shared_ptr<const Brick> PatchBuilder::metal_brick(const Case& bone, Coord i
   return kept = made;
 }
 
+void PatchBuilder::find_near(const ToolModel& model, const Pose& pose_tool_bone, const CoordBox& bricks,
+                             double pitch_mm, double margin_mm) {
+  near_.clear();
+  const double half_diagonal_mm = 0.5 * std::sqrt(3.0) * kBrickCells * pitch_mm;
+  for_each(bricks, [&](Coord index) {
+    const double distance_mm = model.solid(pose_tool_bone.point(brick_centre_mm(index, pitch_mm)));
+    if (distance_mm < margin_mm + half_diagonal_mm && distance_mm > -half_diagonal_mm - model.fine_pitch_mm)
+      near_.push_back(index);
+  });
+}
+
 void PatchBuilder::build(std::span<const CutField* const> bodies, const ToolModel& model, const Pose& pose,
                          Patch& patch) {
   const double h = bodies.front()->bone().pitch_mm();
@@ -131,16 +143,9 @@ void PatchBuilder::build(std::span<const CutField* const> bodies, const ToolMode
   fine_level_ = model.cut_level;
   const Pose pose_tool_bone = pose.inverse();
 
-  // Leaves out bricks whose centre is farther from the tool's surface than the margin and half their diagonal. Leaves
-  // out those deep inside the tool too.
-  const auto fill = [&](BrickGrid& grid, const CoordBox& bricks, double pitch, double margin_mm, const auto& make) {
+  const auto fill = [&](BrickGrid& grid, const CoordBox& bricks, double pitch, const auto& make) {
     grid.reset(pitch, bricks.min, bricks.max);
-    const double half_diagonal_mm = 0.5 * std::sqrt(3.0) * kBrickCells * pitch;
-    for_each(bricks, [&](Coord index) {
-      const double distance_mm = model.solid(pose_tool_bone.point(brick_centre_mm(index, pitch)));
-      if (distance_mm < margin_mm + half_diagonal_mm && distance_mm > -half_diagonal_mm - model.fine_pitch_mm)
-        grid.set(index, make(index));
-    });
+    for (const Coord index : near_) grid.set(index, make(index));
   };
 
   // The fine box ends a margin beyond the tip and reaches back as far as the sample limit allows.
@@ -150,19 +155,20 @@ void PatchBuilder::build(std::span<const CutField* const> bodies, const ToolMode
       params_.fine_samples * model.fine_pitch_mm - 2.0 * params_.fine_margin_mm - (blade ? 0.0 : tool.diameter_mm);
   const double back_mm = blade ? tool.reach_mm() : tool.cutting_length_mm;
   const Box fine_box = tool_box(model, pose, 0.0, -std::min(back_mm, std::max(1.0, fine_reach_mm)));
-  fill(patch.fine, bricks_in(fine_box.grown(params_.fine_margin_mm), model.fine_pitch_mm), model.fine_pitch_mm,
-       params_.fine_margin_mm, [&](Coord i) { return brick(fine_, bodies, model.cut_level, i, Quantity::solid); });
+  const CoordBox fine = bricks_in(fine_box.grown(params_.fine_margin_mm), model.fine_pitch_mm);
+  find_near(model, pose_tool_bone, fine, model.fine_pitch_mm, params_.fine_margin_mm);
+  fill(patch.fine, fine, model.fine_pitch_mm,
+       [&](Coord i) { return brick(fine_, bodies, model.cut_level, i, Quantity::solid); });
 
   const CoordBox coarse = bricks_in(tool_box(model, pose, 0.0, -tool.reach_mm()).grown(params_.coarse_margin_mm), h);
-  fill(patch.coarse, coarse, h, params_.coarse_margin_mm,
-       [&](Coord i) { return brick(coarse_, bodies, 0, i, Quantity::solid); });
-  fill(patch.density, coarse, h, params_.coarse_margin_mm,
-       [&](Coord i) { return brick(density_, bodies, 0, i, Quantity::density); });
+  find_near(model, pose_tool_bone, coarse, h, params_.coarse_margin_mm);
+  fill(patch.coarse, coarse, h, [&](Coord i) { return brick(coarse_, bodies, 0, i, Quantity::solid); });
+  fill(patch.density, coarse, h, [&](Coord i) { return brick(density_, bodies, 0, i, Quantity::density); });
 
   const Case& bone = bodies.front()->bone();
   patch.has_metal = false;
   if (!bone.metal_leaves().empty())
-    fill(patch.metal, coarse, h, params_.coarse_margin_mm, [&](Coord i) {
+    fill(patch.metal, coarse, h, [&](Coord i) {
       std::shared_ptr<const Brick> made = metal_brick(bone, i);
       patch.has_metal |= made != nullptr;
       return made;

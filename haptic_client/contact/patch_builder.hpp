@@ -37,6 +37,10 @@ class PatchBuilder {
  private:
   using Store = std::unordered_map<Coord, std::shared_ptr<const Brick>, CoordHash>;
   enum class Quantity { solid, density };
+  // Fills near_ with the bricks whose centre is at most the margin and half their diagonal from the tool's surface, and
+  // not deep inside the tool.
+  void find_near(const ToolModel& model, const Pose& pose_tool_bone, const CoordBox& bricks, double pitch_mm,
+                 double margin_mm);
   // Null where the brick holds no metal.
   std::shared_ptr<const Brick> metal_brick(const Case& bone, Coord index);
   std::shared_ptr<const Brick> brick(Store& store, std::span<const CutField* const> bodies, int level, Coord index,
@@ -46,6 +50,7 @@ class PatchBuilder {
   int fine_level_ = -1;
   Store fine_, coarse_, density_, metal_;
   std::vector<const CutField*> bodies_;  // of the last patch, to detect added or removed bodies
+  std::vector<Coord> near_;              // bricks of the grid that is being filled
   std::shared_ptr<const Brick> air_;     // shared by every brick far from bone
   std::size_t bricks_made_ = 0;
 };

@@ -7,6 +7,7 @@
 #include <cctype>
 #include <fstream>
 #include <initializer_list>
+#include <memory>
 #include <regex>
 #include <sstream>
 #include <string>
@@ -202,15 +203,38 @@ for number in range(30):
 END
 )";
 
-class Pages : public ::testing::TestWithParam<const char*> {};
+class Pages : public ::testing::TestWithParam<const char*> {
+ protected:
+  // Made once for all pages.
+  static void SetUpTestSuite() {
+    inputs_ = std::make_unique<TempDir>();
+    prepare(*inputs_);
+    std::ofstream(*inputs_ / "inputs.sh") << "set -euo pipefail\n" << kInputs;
+    ProcessOptions options;
+    options.folder = inputs_->path();
+    options.environment = {{"OSTEON_PYTHON", OSTEON_PYTHON}};
+    const RunResult made = run("bash", {*inputs_ / "inputs.sh"}, kUntilHung, options);
+    ASSERT_EQ(made.exit_code, 0) << made.out << made.err;
+  }
+  static void TearDownTestSuite() { inputs_.reset(); }
+  static void copy_inputs(const TempDir& to) {
+    for (const char* name : {"scanned", "MY_CD", "femur.stl", "SLICES"})
+      std::filesystem::copy(*inputs_ / name, to / name, std::filesystem::copy_options::recursive);
+  }
+
+ private:
+  static std::unique_ptr<TempDir> inputs_;
+};
+std::unique_ptr<TempDir> Pages::inputs_;
 
 TEST_P(Pages, RunFromAnEmptyFolder) {
   const auto screen = Xvfb::start();
   ASSERT_TRUE(screen) << "Xvfb does not start; deploy/install installs it";
   const TempDir folder;
   prepare(folder);
+  copy_inputs(folder);
   const std::string port = std::to_string(free_port());
-  std::string commands = std::string("set -euo pipefail\n") + kInputs;
+  std::string commands = "set -euo pipefail\n";
   int count = 0;
   for (const Block& block : blocks_of(GetParam())) {
     std::string text;

@@ -151,9 +151,12 @@ TEST(Hands, WhoseToolsTouchBothFeelIt) {
   Stage stage(40.0);
   // Two drills of 3.2 mm enter the same bone side by side, 2.6 mm between their axes. A third one is far from both.
   constexpr double kDiameter_mm = 3.2;
-  Process left = start_recorded_hand(stage, "left", json::array({drill_at(-1.3, 0, "rig")}));
-  Process right = start_recorded_hand(stage, "right", json::array({drill_at(1.3, 0, "rig")}));
-  Process far = start_recorded_hand(stage, "far", json::array({drill_at(0, 14, "rig")}));
+  const auto drills = [&](const char* name, double x_mm, double y_mm) {
+    json step = drill_at(x_mm, y_mm, "rig");
+    step["to_mm"] = 10.0;
+    return start_recorded_hand(stage, name, json::array({step}));
+  };
+  Process left = drills("left", -1.3, 0), right = drills("right", 1.3, 0), far = drills("far", 0, 14);
   for (Process* hand : {&left, &right, &far}) {
     const auto code = hand->wait(150s);
     ASSERT_TRUE(code.has_value());

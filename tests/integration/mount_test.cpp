@@ -74,7 +74,9 @@ TEST(Mount, TwoHandsPressOneBone) {
 // Without a compliant mount, nobody receives messages about one.
 TEST(Mount, ABoneWithoutOneStands) {
   Stage stage(40.0);
-  Process hand = start_hand(stage, "hand", drill_at(0, 0, "expert"), stage.address(), {});
+  json step = drill_at(0, 0, "expert");
+  step["to_mm"] = 3.0;
+  Process hand = start_hand(stage, "hand", step, stage.address(), {});
   ASSERT_EQ(hand.wait(120s), 0) << hand.err();
   const json mount = read_json(stage / "hand.json").at("mount");
   EXPECT_FALSE(mount.at("there"));

@@ -47,6 +47,20 @@ std::vector<std::string> viewer_arguments(const std::string& address, std::vecto
   return arguments;
 }
 
+// The case of a block. The process makes it once, because the importer takes as long as most tests compute.
+std::filesystem::path block(double width_mm) {
+  static const TempDir all;
+  const std::string width = std::to_string(width_mm);
+  std::filesystem::path made = all / width;
+  if (std::filesystem::exists(made)) return made;
+  const RunResult imported = run(program("osteon-import"),
+                                 {"phantom", "block", "--layers", "5:1.9,20:0.3,5:1.9", "--width", width, "--pitch",
+                                  "0.5", "--out", made.string()},
+                                 120s);
+  if (imported.exit_code != 0) throw std::runtime_error("osteon-import failed: " + imported.err);
+  return made;
+}
+
 }  // namespace
 
 ScriptedViewer::ScriptedViewer(const std::string& address, const Xvfb& screen, std::vector<std::string> more)
@@ -62,11 +76,7 @@ bool ScriptedViewer::tell(const std::string& command, std::chrono::milliseconds 
 }
 
 Stage::Stage(double width_mm, std::vector<std::string> server_arguments) {
-  const RunResult imported = run(program("osteon-import"),
-                                 {"phantom", "block", "--layers", "5:1.9,20:0.3,5:1.9", "--width",
-                                  std::to_string(width_mm), "--pitch", "0.5", "--out", temp_ / "case"},
-                                 120s);
-  if (imported.exit_code != 0) throw std::runtime_error("osteon-import failed: " + imported.err);
+  std::filesystem::copy(block(width_mm), temp_ / "case", std::filesystem::copy_options::recursive);
   start_server(std::move(server_arguments));
 }
 

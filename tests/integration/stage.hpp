@@ -43,8 +43,8 @@ class ScriptedViewer {
 // A folder with a case, and a server of that case.
 class Stage {
  public:
-  // Runs `osteon-import phantom block --layers 5:1.9,20:0.3,5:1.9 --width WIDTH --pitch 0.5 --out case`, then
-  // start_server().
+  // Copies what `osteon-import phantom block --layers 5:1.9,20:0.3,5:1.9 --width WIDTH --pitch 0.5` makes to `case`,
+  // then start_server().
   explicit Stage(double width_mm = 40.0, std::vector<std::string> server_arguments = {"--plain"});
   // Does the same with a case that `make_case` writes to the given folder.
   explicit Stage(const std::function<void(const std::filesystem::path&)>& make_case,

@@ -2,10 +2,13 @@
 
 OSTEON_BIN: folder of the programs.
 """
+import atexit
 import collections
 import contextlib
+import functools
 import json
 import os
+import shutil
 import struct
 import subprocess
 import tempfile
@@ -29,7 +32,7 @@ class Server:
         self.folder, self.access = Path(folder), access
         self.case = self.folder / "case"
         if not self.case.exists():
-            run("osteon-import", "phantom", "block", "--layers", "5:1.9,5:0.3", "--width", width, "--out", self.case)
+            shutil.copytree(block(width), self.case)
         self.address_file = self.folder / "address"
         self.address_file.unlink(missing_ok=True)
         self.options = options
@@ -55,6 +58,16 @@ class Server:
         assert self.process.returncode == 0, said
         self.address_file.unlink(missing_ok=True)
         return json.loads((self.folder / "summary.json").read_text())
+
+
+@functools.cache
+def block(width):
+    """The folder of a block's case, made once."""
+    folder = tempfile.TemporaryDirectory(prefix="osteon-protocol-")
+    atexit.register(folder.cleanup)
+    case = Path(folder.name) / "case"
+    run("osteon-import", "phantom", "block", "--layers", "5:1.9,5:0.3", "--width", width, "--out", case)
+    return case
 
 
 def run(program, *arguments):

@@ -1,5 +1,6 @@
 """Checks wire.py with what a real server once said (vectors.json), and that one flipped bit is noticed in each."""
 import base64
+import itertools
 import json
 import os
 import struct
@@ -92,6 +93,7 @@ CHECKS = {check.__name__: check for check in (tool_hash, field_hash, surface_has
 
 
 TRIED = 64  # bits of each field, or all of them if it has fewer
+ALL = os.environ.get("OSTEON_TRIALS") == "all"  # as deploy/nightly sets it; else a quarter of these bits
 
 
 def flipped_hex(text, bit):
@@ -138,7 +140,8 @@ def broken(given):
     for name, value in given.items():
         # `tools` only says what a number means, and `pitch_mm` of a field only which leaves are empty.
         if name not in ("tools", "pitch_mm"):
-            yield from ((name, dict(given, **{name: changed})) for changed in flips(name, value))
+            tried = itertools.islice(flips(name, value), 0, None, 1 if ALL else 4)
+            yield from ((name, dict(given, **{name: changed})) for changed in tried)
 
 
 class Vectors(unittest.TestCase):

@@ -1,5 +1,6 @@
 #include "tests/support/wait.hpp"
 
+#include <algorithm>
 #include <fstream>
 #include <thread>
 
@@ -11,13 +12,17 @@ constexpr int kSlower = 5;  // under a sanitizer, as the limits of ctest
 #else
 constexpr int kSlower = 1;
 #endif
+// Many conditions ask another program, or read a file. Asked every 2 ms, they took as long as the test.
+constexpr std::chrono::milliseconds kShortest{2}, kLongest{20};
+constexpr int kPauses = 50;  // a pause is this part of the time that has passed
 }  // namespace
 
 bool wait_until(const std::function<bool()>& condition, std::chrono::milliseconds patience) {
-  const auto deadline = std::chrono::steady_clock::now() + kSlower * patience;
+  const auto began = std::chrono::steady_clock::now(), deadline = began + kSlower * patience;
   while (!condition()) {
-    if (std::chrono::steady_clock::now() >= deadline) return false;
-    std::this_thread::sleep_for(std::chrono::milliseconds{2});
+    const auto now = std::chrono::steady_clock::now();
+    if (now >= deadline) return false;
+    std::this_thread::sleep_for(std::clamp<std::chrono::nanoseconds>((now - began) / kPauses, kShortest, kLongest));
   }
   return true;
 }

@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/tools/tool_solid.hpp"
+
 namespace osteon {
 
 namespace {
@@ -26,6 +28,7 @@ QIcon tool_icon(const Tool& tool) {
   const double below = box.max_mm.z(), middle = 0.5 * (box.min_mm.x() + box.max_mm.x());
   const double depth = 0.5 * (box.min_mm.y() + box.max_mm.y());
 
+  const Implicit solid = tool_solid(tool);
   QImage image(kEdge_px, kEdge_px, QImage::Format_ARGB32);
   image.fill(Qt::transparent);
   for (int y = 0; y < kEdge_px; ++y)
@@ -33,7 +36,7 @@ QIcon tool_icon(const Tool& tool) {
       const double z = below - mm_per_px * (kEdge_px - kMargin_px - y);
       if (z < below - shown) continue;
       const Vec3 point(middle + mm_per_px * (x + 0.5 - 0.5 * kEdge_px), depth, z);
-      const double distance = signed_distance_mm(tool, point) / mm_per_px;
+      const double distance = solid(point) / mm_per_px;
       if (distance > 0.5) continue;
       // The surface's slope in the picture shades it, as if it were round.
       const double side = std::clamp(0.5 - distance, 0.0, 1.0);

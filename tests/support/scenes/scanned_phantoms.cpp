@@ -19,10 +19,10 @@ struct Sums {
 };
 
 template <class Visit>
-void visit_samples(const CoordBox& box, Visit visit) {
+void visit_samples(const CoordBox& box, double pitch_mm, Visit visit) {
   for (int x = box.min.x; x <= box.max.x; ++x)
     for (int y = box.min.y; y <= box.max.y; ++y)
-      for (int z = box.min.z; z <= box.max.z; ++z) visit(Coord{x, y, z}, position_mm({x, y, z}, kSample_mm));
+      for (int z = box.min.z; z <= box.max.z; ++z) visit(Coord{x, y, z}, position_mm({x, y, z}, pitch_mm));
 }
 
 }  // namespace
@@ -34,7 +34,7 @@ Vec3 cortex_of(const phantoms::PhantomBone& bone, int number) {
   box.max.z -= kFromEnds;
   Vec3 found = Vec3::Zero();
   double deepest = 0.0;
-  visit_samples(box, [&](const Coord&, const Vec3& at_mm) {
+  visit_samples(box, kSample_mm, [&](const Coord&, const Vec3& at_mm) {
     const phantoms::BoneDepths at = bone.depths(at_mm);
     const double depth = std::min(-at.surface_mm, at.cortex_mm);
     if (at.bone != number || depth <= deepest) return;
@@ -58,7 +58,7 @@ Result<import::CtImport> scanned_and_imported(const phantoms::PhantomBone& shown
 }
 
 Result<PhantomAgreement> agreement_of_scan(const phantoms::PhantomBone& bone, const import::CtOptions& options,
-                                           const std::filesystem::path& folder) {
+                                           const std::filesystem::path& folder, double compared_mm) {
   const auto made = scanned_and_imported(bone, bone, options, folder);
   if (!made) return tl::unexpected(made.error());
   if (auto saved = made->bone->save(folder / "case", made->scan); !saved) return tl::unexpected(saved.error());
@@ -68,7 +68,8 @@ Result<PhantomAgreement> agreement_of_scan(const phantoms::PhantomBone& bone, co
   constexpr double kAround_mm = 4.0, kFar_mm = 6.0;
   double both = 0.0, sum = 0.0;
   Sums cortical, cancellous;
-  visit_samples(covering_samples(bone.bounds().grown(kAround_mm), kSample_mm), [&](const Coord&, const Vec3& at) {
+  const Box around = bone.bounds().grown(kAround_mm);
+  visit_samples(covering_samples(around, compared_mm), compared_mm, [&](const Coord&, const Vec3& at) {
     const phantoms::BoneDepths depths = bone.depths(at);
     const bool real = depths.surface_mm < 0.0, there = found->surface_mm(at) < 0.0;
     both += real && there ? 1.0 : 0.0;
@@ -110,7 +111,7 @@ Result<std::vector<BoneDice>> dice_of_bones(const phantoms::PhantomBone& joint, 
   box.max.z = static_cast<int>(field.max_mm.z());
   std::vector<double> both(names.size()), sum(names.size());
   double without_seed = 0.0;
-  visit_samples(box, [&](const Coord& sample, const Vec3& at) {
+  visit_samples(box, kSample_mm, [&](const Coord& sample, const Vec3& at) {
     const phantoms::BoneDepths depths = joint.depths(at);
     const int real = depths.surface_mm < 0.0 ? depths.bone : 0;
     const int there = made->bone->surface_mm(at) < 0.0 ? made->bone->bone_number(sample) : 0;

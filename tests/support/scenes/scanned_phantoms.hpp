@@ -22,10 +22,10 @@ namespace osteon::test {
 struct PhantomAgreement {
   double dice = 0.0, cortical_percent = 0.0, cancellous_percent = 0.0;
 };
-// The case was saved into the folder, and loaded again.
+// The case was saved into the folder, and loaded again. `compared_mm`: between two compared samples.
 [[nodiscard]] Result<PhantomAgreement> agreement_of_scan(const phantoms::PhantomBone& bone,
                                                          const import::CtOptions& options,
-                                                         const std::filesystem::path& folder);
+                                                         const std::filesystem::path& folder, double compared_mm = 1.0);
 
 // A point deep in the cortex of a bone, far from the ends of a tilted scan. `number`: of the bone.
 [[nodiscard]] Vec3 cortex_of(const phantoms::PhantomBone& bone, int number);

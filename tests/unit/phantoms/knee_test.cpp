@@ -192,15 +192,22 @@ std::map<int, std::vector<Vec3>> surface_points(const Case& knee) {
   return points;
 }
 
+// The points that may lie within 8 mm of others.
+std::vector<Vec3> points_near(const std::vector<Vec3>& points, const std::vector<Vec3>& others) {
+  Box box;
+  for (const Vec3& p : others) box.include(p);
+  box = box.grown(8.0);
+  std::vector<Vec3> found;
+  for (const Vec3& p : points)
+    if ((p.array() >= box.min_mm.array()).all() && (p.array() <= box.max_mm.array()).all()) found.push_back(p);
+  return found;
+}
+
 double gap_mm(const std::vector<Vec3>& a, const std::vector<Vec3>& b) {
-  Box near;
-  for (const Vec3& p : b) near.include(p);
-  near = near.grown(8.0);
   double least = std::numeric_limits<double>::infinity();
-  for (const Vec3& p : a) {
-    if ((p.array() < near.min_mm.array()).any() || (p.array() > near.max_mm.array()).any()) continue;
-    for (const Vec3& q : b) least = std::min(least, (p - q).squaredNorm());
-  }
+  const std::vector<Vec3> near_b = points_near(a, b), near_a = points_near(b, near_b);
+  for (const Vec3& p : near_b)
+    for (const Vec3& q : near_a) least = std::min(least, (p - q).squaredNorm());
   return std::sqrt(least);
 }
 

@@ -52,7 +52,7 @@ void expect_ranges(const std::string& kind, std::span<const ParameterField<Param
 }
 
 // How many random sets of parameters a test of a kind of bone makes.
-inline int random_sets() { return static_cast<int>(test::trials(200, 20)); }
+inline int random_sets() { return static_cast<int>(test::trials(200, 8)); }
 
 // A bone of random words and parameters; those that do not fit together are drawn again. Each is up to `spread` away
 // from the preset. Cartilage keeps the thickness that follows from the others.

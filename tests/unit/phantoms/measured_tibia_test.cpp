@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -136,11 +137,17 @@ void measure_fibula(const BoneView& view, const LegPoints& points, Values& found
   found["fibula_cortex_mm"] =
       0.5 * (view.cortex_mm(inside, Vec3::UnitY(), 6.0) + view.cortex_mm(inside, -Vec3::UnitY(), 6.0));
   found["fibula_head_mm"] = 2.0 * fitted_ball(points_between(fibula, height.most - 4.0, height.most + 1.0)).radius;
+  // Only points that are nearly as high can be nearest to each other.
+  constexpr double kHigher_mm = 8.0;
+  std::vector<Vec3> tibia = points.tibia;
+  const auto z_of = [](const Vec3& p) { return p.z(); };
+  std::ranges::sort(tibia, {}, z_of);
   double gap = 1e9;
   for (const auto& [low, high] : {std::pair{height.least, height.least + 60.0}, {height.most - 60.0, height.most}})
     for (const Vec3& f : points_between(fibula, low, high))
-      for (const Vec3& t : points.tibia)
-        if (std::abs(t.z() - f.z()) < 8.0) gap = std::min(gap, (t - f).squaredNorm());
+      for (auto t = std::ranges::upper_bound(tibia, f.z() - kHigher_mm, {}, z_of);
+           t != tibia.end() && t->z() < f.z() + kHigher_mm; ++t)
+        gap = std::min(gap, (*t - f).squaredNorm());
   found["gap_mm"] = std::sqrt(gap);
 }
 

@@ -5,6 +5,7 @@
 
 #include <fstream>
 #include <future>
+#include <memory>
 #include <mutex>
 #include <thread>
 
@@ -81,14 +82,20 @@ class MountedHand final : public test::FakeSession {
 // 240 cuts in 2.4 s.
 class DemonstrationTest : public ::testing::Test {
  protected:
-  void SetUp() override {
-    ASSERT_TRUE(test_block().save(dir_ / "case"));
-    fs::create_directories(dir_ / "rooms");
+  // Case and journals, made once.
+  static void SetUpTestSuite() {
+    made_ = std::make_unique<TempDir>();
+    ASSERT_TRUE(test_block().save(*made_ / "case"));
+    fs::create_directories(*made_ / "rooms");
     for (const std::string name : {"ward", "shown", "other"}) {
-      KeptCuts kept(dir_ / "rooms" / (name + ".journal"), nullptr, name);
+      KeptCuts kept(*made_ / "rooms" / (name + ".journal"), nullptr, name);
       kept.cut(300);
       ASSERT_TRUE(kept.store->close());
     }
+  }
+  static void TearDownTestSuite() { made_.reset(); }
+  void SetUp() override {
+    fs::copy(made_->path(), dir_.path(), fs::copy_options::recursive);
     // An upload validation that takes long, and that creates a file when it begins.
     std::ofstream(dir_ / "checker") << "#!/bin/sh\n: > '" << (dir_ / "checks").string() << "'\nexec sleep 60\n";
     fs::permissions(dir_ / "checker", fs::perms::owner_all);
@@ -124,12 +131,14 @@ class DemonstrationTest : public ::testing::Test {
   }
   std::uint64_t committed() { return room_->runtime().bone_status().counts.committed; }
 
+  static std::unique_ptr<TempDir> made_;
   TempDir dir_;
   std::unique_ptr<RoomServer> server_;
   std::shared_ptr<OpenRoom> room_;  // shared with the rooms
   AuthorId instructor_;
   SeenTools seen_;
 };
+std::unique_ptr<TempDir> DemonstrationTest::made_;
 
 // The cuts are so close together that the tool is never seen at rest between two of them.
 TEST_F(DemonstrationTest, IsSeenAtRestWhileItIsStoppedOrWithoutItsTool) {

@@ -8,6 +8,7 @@
 
 #include "common/wire/encoded_cut.hpp"
 #include "server/storage/journal_entries.hpp"
+#include "tests/support/trials.hpp"
 #include "tests/unit/room/cuts.hpp"
 #include "tests/unit/room/parts.hpp"
 
@@ -167,7 +168,7 @@ TEST_P(LogEntries, GoOnFromACheckpoint) {
   expect_same(busy.room, recovered);
 }
 
-INSTANTIATE_TEST_SUITE_P(Seeds, LogEntries, ::testing::Range(1u, 9u));
+INSTANTIATE_TEST_SUITE_P(Seeds, LogEntries, ::testing::Range(1u, 1 + test::trials(8, 3)));
 
 // A cut that was encoded before has the same bytes in the journal.
 TEST(LogEntryBytes, ContainACutAsItWasEncoded) {

@@ -10,6 +10,7 @@
 
 #include "tests/scenario/recording.hpp"
 #include "tests/support/shared_data.hpp"
+#include "tests/support/trials.hpp"
 #include "tests/unit/wire/link_pair.hpp"
 #include "tests/unit/wire/link_trial.hpp"
 
@@ -25,6 +26,7 @@ using test::Random;
 using test::Time;
 using test::Trial;
 using test::TrialOptions;
+using test::trials;
 
 double ms(Time t) { return std::chrono::duration<double, std::milli>(t).count(); }
 
@@ -38,7 +40,8 @@ TEST(LinkEnds, EverythingOnceAndInOrderOnAHostileNetwork) {
   std::vector<double> settled_ms;
   std::uint64_t corrupted = 0, forged = 0;
   std::size_t most_waiting = 0, words = 0, long_words = 0;
-  for (std::uint64_t seed = 1; seed <= 200; ++seed) {
+  const unsigned seeds = trials(200);
+  for (std::uint64_t seed = 1; seed <= seeds; ++seed) {
     Trial trial({.seed = seed, .quality = hostile()});
     Random random(seed);
     if (seed % 4 != 0) {
@@ -74,12 +77,12 @@ TEST(LinkEnds, EverythingOnceAndInOrderOnAHostileNetwork) {
     corrupted += trial.network.counts().paths.corrupted;
   }
   std::printf(
-      "200 seeds: %zu cuts, %zu entries taken, %zu of them by stream; %llu datagrams corrupted, %llu seen as forged; "
+      "%u seeds: %zu cuts, %zu entries taken, %zu of them by stream; %llu datagrams corrupted, %llu seen as forged; "
       "without partition settled after p50 %.0f, most %.0f ms\n",
-      cuts, entries, by_stream, static_cast<unsigned long long>(corrupted), static_cast<unsigned long long>(forged),
-      share_of(settled_ms, 0.5), share_of(settled_ms, 1.0));
-  EXPECT_GT(words, 100u);
-  EXPECT_GT(long_words, 20u);
+      seeds, cuts, entries, by_stream, static_cast<unsigned long long>(corrupted),
+      static_cast<unsigned long long>(forged), share_of(settled_ms, 0.5), share_of(settled_ms, 1.0));
+  EXPECT_GT(words, trials(100));
+  EXPECT_GT(long_words, trials(20));
   EXPECT_GT(words - long_words, long_words / 2);
   // Duplicates of corrupted datagrams count twice. Flips in the session or the counter count as another fault.
   EXPECT_GT(forged, corrupted / 3);
@@ -93,7 +96,8 @@ TEST(LinkEnds, DelayUntilAPartnerHasACut) {
     double up = 0, down = 0;
     PathQuality quality = hostile(40ms);
     quality.reorder = quality.duplicate = quality.corrupt = 0;
-    for (std::uint64_t seed = 1; seed <= 40; ++seed) {
+    const unsigned seeds = trials(40);
+    for (std::uint64_t seed = 1; seed <= seeds; ++seed) {
       Trial trial({.seed = seed, .quality = bad ? quality : PathQuality{}, .long_cuts = 0, .events = 0});
       trial.time.run_until(1s);
       trial.cut(true);
@@ -101,8 +105,8 @@ TEST(LinkEnds, DelayUntilAPartnerHasACut) {
       trial.cut(false);
       trial.settle(4s);
       ASSERT_TRUE(trial.settled());
-      up += static_cast<double>(trial.clients[0]->uplink_bytes) * 8 / 5000 / 40;
-      down += static_cast<double>(trial.sessions[0]->downlink_bytes) * 8 / 5000 / 40;
+      up += static_cast<double>(trial.clients[0]->uplink_bytes) * 8 / 5000 / seeds;
+      down += static_cast<double>(trial.sessions[0]->downlink_bytes) * 8 / 5000 / seeds;
       for (const auto& client : trial.clients) felt.insert(felt.end(), client->felt_ms.begin(), client->felt_ms.end());
     }
     std::printf("%s: p50 %.1f p90 %.1f p99 %.1f p99.9 %.1f max %.1f ms; %.0f kbit/s up, %.0f down\n",
@@ -157,7 +161,7 @@ TEST(LinkEnds, UplinkBytesOfDrillingAndRest) {
 
 TEST(LinkEnds, NewKeysWhilePacketsAreInFlight) {
   std::size_t entries = 0, by_stream = 0;
-  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+  for (std::uint64_t seed = 1; seed <= trials(20); ++seed) {
     TrialOptions options{.seed = seed, .quality = hostile()};
     options.up.seal.rekey_packets = options.down.seal.rekey_packets = 40;
     options.up.seal.previous_for = options.down.seal.previous_for = 1s;
@@ -182,7 +186,7 @@ TEST(LinkEnds, NewKeysWhilePacketsAreInFlight) {
 TEST(LinkEnds, AClientThatMovesIsFoundWithinASecond) {
   std::vector<double> found_ms;
   for (const bool cutting : {true, false}) {
-    for (std::uint64_t seed = 1; seed <= 150; ++seed) {
+    for (std::uint64_t seed = 1; seed <= trials(150); ++seed) {
       Trial trial({.seed = seed, .quality = hostile()});
       trial.time.run_until(500ms);
       trial.cut(cutting);
@@ -193,7 +197,7 @@ TEST(LinkEnds, AClientThatMovesIsFoundWithinASecond) {
         trial.time.run_until(trial.time.now() + 1ms);
       found_ms.push_back(ms(trial.time.now() - moved));
       EXPECT_EQ(trial.sessions[0]->link.moves(), 2u);
-      if (seed > 40) continue;
+      if (seed > trials(40)) continue;
       trial.cut(false);
       trial.settle(5s);
       EXPECT_TRUE(trial.exact() && trial.settled()) << "seed " << seed;
@@ -278,7 +282,7 @@ TEST(LinkEnds, WithoutDatagramsAllGoesOverTheStream) {
 }
 
 TEST(LinkEnds, BackAndForthBetweenDatagramsAndStream) {
-  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+  for (std::uint64_t seed = 1; seed <= trials(20); ++seed) {
     Trial trial({.seed = seed, .quality = hostile()});
     for (int i = 0; i < 5; ++i) trial.block(1s + i * 3s, 2500ms + i * 3s);
     trial.time.run_until(400ms);
@@ -724,7 +728,7 @@ TEST(LinkEnds, StatesFollowTheToolWithinTheDeadband) {
 
 TEST(LinkEnds, FreezeAndEpochGetThroughAtOnce) {
   std::vector<double> took_ms;
-  for (std::uint64_t seed = 1; seed <= 100; ++seed) {
+  for (std::uint64_t seed = 1; seed <= trials(100); ++seed) {
     Trial trial({.seed = seed, .quality = hostile(40ms)});
     trial.time.run_until(2s);
     wire::ServerLink& server = trial.sessions[0]->link;

@@ -19,13 +19,15 @@
 namespace osteon::haptic::test {
 namespace {
 
-PlanStep drill(HandKind hand, const Vec3& at) {
+// Through the bone, or to a depth.
+PlanStep drill(HandKind hand, const Vec3& at, double to_mm = 0.0) {
   PlanStep step;
   step.action = Action::drill;
   step.tool = "drill-3.2";
   step.spindle_rpm = 1000;
   step.hand = hand;
   step.feed_mm_per_s = 3;
+  step.to_mm = to_mm;
   step.entry.point_mm = at;
   step.entry.axis = Vec3(0, 0, 1);
   return step;
@@ -116,7 +118,7 @@ TEST(Replay, MakesTheSameCutsAndForces) {
   const osteon::test::TempDir temp;
   const Case bone = block_case(16.0);
   const std::vector<PlanStep> plan{drill(HandKind::expert, {3.1, -0.2, 0}), burr(),
-                                   drill(HandKind::rig, {3.4, 4.2, 0})};
+                                   drill(HandKind::rig, {3.4, 4.2, 0}, 8.0)};
   for (const char* name : {"simulated", "simulated-3.3N"}) {
     const Session made = record(bone, plan, *find_simulated_device(name), temp / "a.h5");
     const Session again = replay(bone, plan, temp / "a.h5");
@@ -246,7 +248,8 @@ TEST(Replay, OfADamagedFileIsReadOrRefused) {
 TEST(Replay, MovesTheBoneAsItMoved) {
   const osteon::test::TempDir temp;
   const Case bone = block_case(16.0);
-  const std::vector<PlanStep> plan{drill(HandKind::expert, {3.1, -0.2, 0}), drill(HandKind::rig, {-3.4, 2.2, 0})};
+  const std::vector<PlanStep> plan{drill(HandKind::expert, {3.1, -0.2, 0}, 8.0),
+                                   drill(HandKind::rig, {-3.4, 2.2, 0}, 8.0)};
   const auto sways = [](std::uint64_t tick) {
     const double t = 1e-3 * static_cast<double>(tick);
     return Pose{Vec3(0.2 * std::sin(1.3 * t), 0.1, 0.6 * std::sin(0.7 * t + 0.3)),
@@ -266,7 +269,8 @@ TEST(Replay, MovesTheBoneAsItMoved) {
 TEST(Replay, EndsWithARecordingThatWasBrokenOff) {
   const osteon::test::TempDir temp;
   const Case bone = block_case();
-  const std::vector<PlanStep> plan{drill(HandKind::expert, {0.1, -0.2, 0}), drill(HandKind::expert, {3.4, 1.2, 0})};
+  const std::vector<PlanStep> plan{drill(HandKind::expert, {0.1, -0.2, 0}, 8.0),
+                                   drill(HandKind::expert, {3.4, 1.2, 0}, 8.0)};
   record(bone, plan, {}, temp / "a.h5");
   for (const double share : {0.02, 0.25, 0.6}) {
     Result<RecordedSession> session = read_recording(temp / "a.h5");

@@ -4,7 +4,9 @@
 #include <gtest/gtest.h>
 
 #include <random>
+#include <vector>
 
+#include "tests/support/scenes/random_cuts.hpp"
 #include "tests/unit/haptic_client/bench.hpp"
 
 namespace osteon::haptic::test {
@@ -77,6 +79,50 @@ TEST(Patch, FollowsCutsWithFewNewBricks) {
   const std::size_t second = builder.bricks_made();
   builder.build(field, model, pose, patch);
   EXPECT_EQ(builder.bricks_made(), second);
+}
+
+// Samples of all bricks, and a number that no sample has for each brick that is unknown.
+std::vector<float> samples_of(const BrickGrid& grid) {
+  std::vector<float> samples;
+  const Coord dims = grid.dims();
+  for (int i = 0; i < dims.x * dims.y * dims.z; ++i) {
+    const float* brick = grid.tables()[i];
+    if (brick != nullptr)
+      samples.insert(samples.end(), brick, brick + kBrickSamples * kBrickSamples * kBrickSamples);
+    else
+      samples.push_back(1e9f);
+  }
+  return samples;
+}
+
+// Cuts of each level change samples of each level. Those that a builder keeps are those of one that begins anew.
+TEST(Patch, FollowsCutsOfEveryLevelInEverySample) {
+  const Case bone = osteon::test::ball_of_bone();
+  const Pose pose{{0, 0, -9.0}, Eigen::Quaterniond::Identity()};
+  for (int level = 0; level < kLevels; ++level) {
+    Tool tool = *find_tool("burr-round-5");
+    tool.cut_level = level;
+    const ToolModel model(tool, bone.pitch_mm());
+    CutField field(bone, BodyId{});
+    PatchBuilder builder;
+    Patch patch, anew;
+    builder.build(field, model, pose, patch);
+    osteon::test::Random random(11);
+    int i = 0, compared = 0;
+    for (Cut& cut : osteon::test::grazing_cuts(100, random)) {
+      cut.level = i++ % kLevels;
+      const CutReport report = field.apply(cut);
+      const std::size_t before = builder.bricks_made();
+      builder.changed(bone.pitch_mm(), report.level, report.changed_leaves);
+      builder.build(field, model, pose, patch);
+      if (builder.bricks_made() == before) continue;
+      ++compared;
+      PatchBuilder().build(field, model, pose, anew);
+      ASSERT_EQ(samples_of(patch.fine), samples_of(anew.fine)) << "level " << level << ", cut " << i;
+      ASSERT_EQ(samples_of(patch.coarse), samples_of(anew.coarse)) << "level " << level << ", cut " << i;
+    }
+    EXPECT_GT(compared, 10) << level;
+  }
 }
 
 // Two bodies share the block. What is solid in either is solid. A body that goes takes its half with it.

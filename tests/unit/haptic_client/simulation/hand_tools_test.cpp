@@ -113,11 +113,11 @@ Pose held(const Tool& tool) {
 }
 
 TEST(HandTools, EveryToolThatCutsTakesBone) {
+  const Case for_large = block(1.0, 70.0, 24.0), for_small = block(0.5, 40.0, 12.0);
   int tried = 0;
   for (const Tool& tool : builtin_tools()) {
     if (!tool.cuts()) continue;
-    const bool large = tool.cut_level == 0;
-    HandStage stage(block(large ? 1.0 : 0.5, large ? 70.0 : 40.0, large ? 24.0 : 12.0), tool, held(tool));
+    HandStage stage(tool.cut_level == 0 ? for_large : for_small, tool, held(tool));
     stage.input_.spindle_rpm = tool.spindle_rpm;
     stage.lead(Vec3::Zero(), 0.5);
     const double before = stage.replica_.removed_mm3();
@@ -157,15 +157,16 @@ TEST(HandTools, EveryToolThatCutsTakesBone) {
 // Pushed down on metal, sideways and turned, no tool takes metal away. It makes no cut that a room would reject, and
 // takes no metal at all.
 TEST(HandTools, NoneThatCutsTakesMetal) {
+  // Metal two voxels deep, and beside small tools a higher step of metal.
+  const Case for_large =
+      block(1.0, 70.0, 24.0, [](const Vec3& p) { return p.z() >= 2.0 ? Tissue::metal : Tissue::none; });
+  const Case for_small = block(0.5, 40.0, 12.0, [](const Vec3& p) {
+    return p.z() >= 1.0 || (p.x() > 4.0 && p.y() > 2.0 && p.z() >= 0.5) ? Tissue::metal : Tissue::none;
+  });
   for (const Tool& tool : builtin_tools()) {
     if (!tool.cuts()) continue;
-    const bool large = tool.cut_level == 0;
-    const double pitch_mm = large ? 1.0 : 0.5, metal_mm = 2.0 * pitch_mm;
-    // Metal from there on, and beside small tools a higher step of metal.
-    const Case bone = block(pitch_mm, large ? 70.0 : 40.0, large ? 24.0 : 12.0, [=](const Vec3& p) {
-      return p.z() >= metal_mm || (!large && p.x() > 4.0 && p.y() > 2.0 && p.z() >= pitch_mm) ? Tissue::metal
-                                                                                              : Tissue::none;
-    });
+    const Case& bone = tool.cut_level == 0 ? for_large : for_small;
+    const double pitch_mm = bone.pitch_mm(), metal_mm = 2.0 * pitch_mm;
     HandStage stage(bone, tool, held(tool));
     stage.input_.spindle_rpm = tool.spindle_rpm;
     stage.lead(Vec3::Zero(), 0.2);
