@@ -67,7 +67,9 @@ void BoneView::show_room(RenderQueue* queue, const Box& bounds) {
 
 void BoneView::arrived() {
   if (!updater_) return;
-  if (updater_->update(true)) redraw();
+  const bool changed = updater_->update(true);
+  (void)updater_->take_arrivals();  // for a log that this window does not write
+  if (changed) redraw();
 }
 
 void BoneView::set_holding(bool on) {
@@ -108,7 +110,6 @@ void BoneView::draw() {
   // Where drawing is slow, leave a third of the time to the other programs of this machine.
   next_frame_ = std::max(begin + kFrame, end + (end - begin) / 2);
   surface_shown_ = updater_ && updater_->complete();
-  if (updater_) (void)updater_->take_arrivals();
   drawing_ = false;
 }
 

@@ -1,5 +1,6 @@
 #include "viewer_client/desktop/room_link.hpp"
 
+#include <QCoreApplication>
 #include <QMetaObject>
 #include <chrono>
 #include <utility>
@@ -17,6 +18,9 @@ RoomLink::~RoomLink() {
   if (subscription_) subscription_->end();
   changed_.notify_all();
   thread_.join();
+  // A subscription that was made just now may still wait in an event for the GUI thread. Its threads write into the
+  // queue, so it ends before the queue does.
+  QCoreApplication::removePostedEvents(this);
 }
 
 void RoomLink::in_gui(std::function<void()> call) {

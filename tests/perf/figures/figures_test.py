@@ -11,6 +11,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent))
 import against  # noqa: E402
 import figures  # noqa: E402
 import groups  # noqa: E402
+import hours  # noqa: E402
 import registry  # noqa: E402
 import results  # noqa: E402
 from registry import Figure  # noqa: E402
@@ -179,6 +180,26 @@ class SeveralSessions(unittest.TestCase):
     def test_a_session_without_a_value_is_not_hidden(self):
         sessions = [{"rig_force_after_exit": (0.0, None)}, {"rig_force_after_exit": (None, None)}]
         self.assertIsNone(groups.over_sessions(sessions)["rig_force_after_exit"][0])
+
+
+class Hours(unittest.TestCase):
+    MINUTES = [float(minute) for minute in range(1, 61)]
+
+    def test_a_leak_is_its_slope_and_the_warm_up_does_not_count(self):
+        sizes = [100.0 + 20.0 * minute / 60.0 - (60.0 if minute < 10 else 0.0) for minute in self.MINUTES]
+        found = hours.growth(self.MINUTES, sizes)
+        self.assertAlmostEqual(found.mb_per_hour, 20.0, places=6)
+        self.assertAlmostEqual(found.percent_per_hour(), 100.0 * 20.0 / (100.0 + 20.0 * 10 / 60.0), places=6)
+        self.assertGreater(found.last_over_first, 1.1)
+
+    def test_noise_is_no_growth(self):
+        found = hours.growth(self.MINUTES, [200.0 + (3.0 if minute % 2 else -3.0) for minute in self.MINUTES])
+        self.assertLess(abs(found.percent_per_hour()), 0.2)
+
+    def test_a_process_that_was_away_gives_no_number(self):
+        self.assertIsNone(hours.growth(self.MINUTES, [0.0 if minute == 30 else 100.0 for minute in self.MINUTES]))
+        self.assertIsNone(hours.growth([1.0, 2.0], [100.0, 100.0]))
+        self.assertIsNone(hours.growth([], []))
 
 
 class Physics(unittest.TestCase):

@@ -11,6 +11,7 @@ import devices
 import feel
 import filters
 import haptics
+import hours
 import imports
 import kernels
 import laws
@@ -259,7 +260,8 @@ def scan(run):
 
 
 GROUPS = {**kernels.GROUPS, **devices.GROUPS, **authentication.GROUPS, **insiders.GROUPS,
-          **feel.GROUPS, **filters.GROUPS, **haptics.GROUPS, **laws.GROUPS, **rooms.GROUPS, **viewing.GROUPS,
+          **feel.GROUPS, **filters.GROUPS, **haptics.GROUPS, **hours.GROUPS, **laws.GROUPS, **rooms.GROUPS,
+          **viewing.GROUPS,
           "expert": expert, "novice": novice, "rig": rig, "scan": scan, "real_imports": imports.real_imports,
           "import_accuracy": imports.import_accuracy,
           "phantoms": imports.phantoms,

@@ -69,6 +69,7 @@ FUZZED = (
 INSIDER_WAYS = (("", ""), ("_proxied", ", through the proxy"))
 INSIDER_ATTACKS = (("killing", "send a header that once ended the server"),
                    ("resets", "begin and reset 20000 calls over a connection"))
+HOURS_OF = ("osteon", "osteon-server", "osteon-haptic", "osteon-audio")  # the window and its children
 MACHINE = "a thread that wakes 20 times a second and syncs 4 KB to the disk, in the same runs"
 
 FIGURES = [
@@ -251,6 +252,13 @@ FIGURES = [
     Figure("scene_rate_over_vtk_with_backs", "ratio", "the same, with back faces as VTK draws them unasked", "scene"),
     Figure("scene_frame_million", "ms", "a frame of a million triangles, median", "scene",
            baseline="VTK alone, without back faces"),
+    # An hour of drilling, undo and saving in the real window: resident memory by a line through all rounds after ten
+    # minutes. In rooms: the case is closed and opened in each round. In a room: it stays open, and all is undone.
+    *[Figure(f"window_{kind}_{program.removeprefix('osteon-')}", "percent",
+             f"growth of {program} in an hour at the window, of its size after ten minutes, {how}", f"window_{kind}",
+             ("<=", 5.0), full=True)
+      for kind, how in (("rooms", "the case opened in each round"), ("room", "in a room that stays open"))
+      for program in HOURS_OF],
     # A skull with a groove from eight sides, coarse where nobody looks or works, beside the same in full.
     Figure("picture_skull_off_cut_pixels", "count", "pixels of a cut's colour farther from the tool's way than a cell "
            "of the bone", "picture_skull", ("==", 0)),
