@@ -13,7 +13,6 @@
 namespace osteon::sound {
 namespace {
 
-constexpr double kRate_hz = 22050;
 constexpr double kTolerance_s = 0.05;
 
 struct Scene {
@@ -31,11 +30,11 @@ std::vector<float> played(const std::vector<Scene>& scenes, unsigned seed) {
   const auto hz = [&](std::string_view line) { return std::ranges::find(lines, line, &GearLine::name)->hz; };
   std::vector<float> all;
   for (const Scene& scene : scenes) {
-    const auto count = static_cast<std::size_t>(scene.seconds * kRate_hz);
+    const auto count = static_cast<std::size_t>(scene.seconds * kAnalysed_hz);
     std::vector<float> part = white_noise(amplitude(scene.noise_db), count, seed++);
-    part = added(part, tone(hz("commutation x3"), amplitude(scene.motor_db), count, kRate_hz));
-    part = added(part, tone(hz("motor mesh"), amplitude(scene.mesh_db), count, kRate_hz));
-    part = added(part, tone(200, amplitude(scene.rumble_db), count, kRate_hz));
+    part = added(part, tone(hz("commutation x3"), amplitude(scene.motor_db), count, kAnalysed_hz));
+    part = added(part, tone(hz("motor mesh"), amplitude(scene.mesh_db), count, kAnalysed_hz));
+    part = added(part, tone(200, amplitude(scene.rumble_db), count, kAnalysed_hz));
     all.insert(all.end(), part.begin(), part.end());
   }
   return all;
@@ -70,7 +69,7 @@ std::vector<Scene> drilling() {
 
 TEST(DrillingStates, KnownStatesAreFoundWithinFiftyMilliseconds) {
   for (const unsigned seed : {1U, 100U, 200U}) {
-    const auto found = drilling_states(played(drilling(), seed), kRate_hz);
+    const auto found = drilling_states(played(drilling(), seed), kAnalysed_hz);
     SCOPED_TRACE(words(found));
     expect_states(found, drilling());
   }
@@ -80,7 +79,7 @@ TEST(DrillingStates, LoudnessOfTheRecordingDoesNotMatter) {
   for (const double gain : {0.3, 2.0}) {
     std::vector<float> samples = played(drilling(), 5);
     for (float& x : samples) x *= static_cast<float>(gain);
-    const auto found = drilling_states(samples, kRate_hz);
+    const auto found = drilling_states(samples, kAnalysed_hz);
     SCOPED_TRACE(words(found));
     expect_states(found, drilling());
   }
@@ -94,7 +93,7 @@ TEST(DrillingStates, OneKindOfBoneIsKnownByItsLines) {
                                        {DrillingState::free, 1.0, -38, -32, -35},
                                        {state, 1.5, -30, hard ? -21.0 : -27.0, hard ? -27.0 : -21.0},
                                        {DrillingState::after, 0.6, -66, -200, -200}};
-    const auto found = drilling_states(played(scenes, 9), kRate_hz);
+    const auto found = drilling_states(played(scenes, 9), kAnalysed_hz);
     SCOPED_TRACE(words(found));
     expect_states(found, scenes);
   }
@@ -102,15 +101,15 @@ TEST(DrillingStates, OneKindOfBoneIsKnownByItsLines) {
 
 TEST(DrillingStates, ASteadyDrillIsFree) {
   const std::vector<Scene> scenes = {{DrillingState::free, 3.0, -38, -32, -35}};
-  expect_states(drilling_states(played(scenes, 3), kRate_hz), scenes);
+  expect_states(drilling_states(played(scenes, 3), kAnalysed_hz), scenes);
 }
 
 TEST(DrillingStates, SilenceIsBeforeAnyDrill) {
-  const auto digital = drilling_states(std::vector<float>(22050, 0.0F), kRate_hz);
+  const auto digital = drilling_states(std::vector<float>(22050, 0.0F), kAnalysed_hz);
   ASSERT_EQ(digital.size(), 1U);
   EXPECT_EQ(digital.front().state, DrillingState::before);
   EXPECT_NEAR(digital.front().to_s, 1.0, 1e-9);
-  EXPECT_TRUE(drilling_states(std::vector<float>(100, 0.1F), kRate_hz).empty());
+  EXPECT_TRUE(drilling_states(std::vector<float>(100, 0.1F), kAnalysed_hz).empty());
 }
 
 TEST(DrillingStates, TheUserMaySayWhereTheDrillRunsFree) {
@@ -119,10 +118,10 @@ TEST(DrillingStates, TheUserMaySayWhereTheDrillRunsFree) {
                                      {DrillingState::cancellous, 1.5, -33, -31, -27},
                                      {DrillingState::free, 0.3, -38, -32, -35}};
   const auto samples = played(scenes, 21);
-  const auto guessed = drilling_states(samples, kRate_hz);
+  const auto guessed = drilling_states(samples, kAnalysed_hz);
   ASSERT_GE(guessed.size(), 2U);
   EXPECT_EQ(guessed[1].state, DrillingState::free) << words(guessed);
-  const auto told = drilling_states(samples, kRate_hz, {.free = TimeSpan{3.05, 3.25}});
+  const auto told = drilling_states(samples, kAnalysed_hz, {.free = TimeSpan{3.05, 3.25}});
   SCOPED_TRACE(words(told));
   expect_states(told, scenes);
 }

@@ -11,8 +11,6 @@
 namespace osteon::sound {
 namespace {
 
-constexpr double kRate_hz = 22050;
-
 TEST(HannWindow, HasItsEnergyAndSumsToOne) {
   for (const int size : {2, 16, 512, 4096}) {
     const std::vector<float> window = hann_window(size);
@@ -53,7 +51,7 @@ TEST(Stft, InverseIsTheSignalForEveryFraming) {
     for (const StftParams& params : {StftParams{1024, 512, 1024}, StftParams{512, 128, 512}, StftParams{256, 100, 1024},
                                      StftParams{441 + 1, 221, 512}}) {
       const std::vector<float> noise = white_noise(0.2, count, 3);
-      const Stft transform = stft(noise, kRate_hz, params);
+      const Stft transform = stft(noise, kAnalysed_hz, params);
       const std::vector<float> back = inverse_stft(transform);
       ASSERT_EQ(back.size(), count);
       for (std::size_t i = 0; i < count; ++i) ASSERT_NEAR(back[i], noise[i], 2e-6) << i << " of " << count;
@@ -61,17 +59,17 @@ TEST(Stft, InverseIsTheSignalForEveryFraming) {
 }
 
 TEST(Stft, BandPowerOfAToneIsHalfItsSquare) {
-  const Stft transform = stft(tone(2000.0, 0.5, 22050, kRate_hz), kRate_hz, {512, 128, 512});
+  const Stft transform = stft(tone(2000.0, 0.5, 22050, kAnalysed_hz), kAnalysed_hz, {512, 128, 512});
   const std::size_t middle = transform.frames / 2;
   EXPECT_NEAR(band_power(transform, middle, 1700, 2300), 0.125, 0.125 * 1e-3);
   // Further than the main lobe, the side lobes of a Hann window fall below -31 dB.
   EXPECT_LT(power_db(band_power(transform, middle, 2600, 11025)), power_db(0.125) - 40);
-  EXPECT_NEAR(transform.time_s(middle), static_cast<double>(middle) * 128 / kRate_hz, 1e-12);
+  EXPECT_NEAR(transform.time_s(middle), static_cast<double>(middle) * 128 / kAnalysed_hz, 1e-12);
 }
 
 TEST(Stft, MiddlesOfFramesCoverTheSignal) {
   for (const std::size_t count : {std::size_t{0}, std::size_t{1}, std::size_t{512}, std::size_t{513}}) {
-    const Stft transform = stft(std::vector<float>(count, 0.1F), kRate_hz, {1024, 512, 1024});
+    const Stft transform = stft(std::vector<float>(count, 0.1F), kAnalysed_hz, {1024, 512, 1024});
     EXPECT_GE((transform.frames - 1) * 512 + 1, count);
   }
 }

@@ -9,6 +9,8 @@
 
 namespace osteon::sound {
 
+inline constexpr double kAnalysed_hz = 22050;  // the rate at which 8.5.4 analyses
+
 inline std::vector<float> tone(double hz, double amplitude, std::size_t count, double rate_hz) {
   std::vector<float> samples(count);
   for (std::size_t i = 0; i < count; ++i)

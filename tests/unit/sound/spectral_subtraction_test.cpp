@@ -9,7 +9,6 @@
 namespace osteon::sound {
 namespace {
 
-constexpr double kRate_hz = 22050;
 constexpr std::size_t kCount = 20 * 22050;
 
 double power_of(const Stft& transform) {
@@ -19,8 +18,8 @@ double power_of(const Stft& transform) {
 }
 
 TEST(SpectralSubtraction, WhiteNoiseKeepsOneOverE) {
-  const Stft noise = stft(white_noise(0.05, kCount, 1), kRate_hz);
-  const Stft other = stft(white_noise(0.05, kCount, 2), kRate_hz);
+  const Stft noise = stft(white_noise(0.05, kCount, 1), kAnalysed_hz);
+  const Stft other = stft(white_noise(0.05, kCount, 2), kAnalysed_hz);
   const Stft left = spectral_subtraction(other, stationary_spectrum(noise, 1, noise.frames - 1));
   // |N|^2 over its mean is exponentially distributed: E[max(0, x - 1)] = exp(-1). The spectra are means of 860 frames,
   // so their ratio is known to 7 % in a bin, and to 0.3 % over all bins.
@@ -28,8 +27,8 @@ TEST(SpectralSubtraction, WhiteNoiseKeepsOneOverE) {
 }
 
 TEST(SpectralSubtraction, MagnitudesLeaveLess) {
-  const Stft noise = stft(white_noise(0.05, kCount, 1), kRate_hz);
-  const Stft other = stft(white_noise(0.05, kCount, 2), kRate_hz);
+  const Stft noise = stft(white_noise(0.05, kCount, 1), kAnalysed_hz);
+  const Stft other = stft(white_noise(0.05, kCount, 2), kAnalysed_hz);
   const Stft left =
       spectral_subtraction(other, stationary_spectrum(noise, 1, noise.frames - 1, SubtractionDomain::magnitude));
   // |N| is Rayleigh distributed with the mean m = sqrt(pi) / 2 for E|N|^2 = 1:
@@ -40,11 +39,11 @@ TEST(SpectralSubtraction, MagnitudesLeaveLess) {
 }
 
 TEST(SpectralSubtraction, AToneInNoiseBecomesClearer) {
-  const std::vector<float> clean = tone(3000, 0.1, kCount, kRate_hz);
+  const std::vector<float> clean = tone(3000, 0.1, kCount, kAnalysed_hz);
   const std::vector<float> noise = white_noise(0.05, kCount, 1), other = white_noise(0.05, kCount, 2);
-  const Stft free = stft(noise, kRate_hz);
+  const Stft free = stft(noise, kAnalysed_hz);
   const std::vector<float> result = inverse_stft(
-      spectral_subtraction(stft(added(clean, other), kRate_hz), stationary_spectrum(free, 1, free.frames)));
+      spectral_subtraction(stft(added(clean, other), kAnalysed_hz), stationary_spectrum(free, 1, free.frames)));
   ASSERT_EQ(result.size(), kCount);
   const double before_db = 10.0 * std::log10(energy(clean) / energy(other));
   const double after_db = 10.0 * std::log10(energy(clean) / energy(differences(result, clean)));
@@ -53,19 +52,19 @@ TEST(SpectralSubtraction, AToneInNoiseBecomesClearer) {
   // windows are correlated by at most 1 / 2.
   EXPECT_GT(after_db - before_db, 4.34);
   EXPECT_LT(after_db - before_db, 4.34 + 3.01);
-  EXPECT_NEAR(tone_db(result, kRate_hz, 3000), 20.0 * std::log10(0.1), 0.1);
+  EXPECT_NEAR(tone_db(result, kAnalysed_hz, 3000), 20.0 * std::log10(0.1), 0.1);
 }
 
 TEST(SpectralSubtraction, FreeSoundAloneIsAlmostGone) {
   // A steady tone is subtracted to nothing, whatever its frequency.
-  const Stft steady = stft(tone(1119.84, 0.2, kCount, kRate_hz), kRate_hz);
+  const Stft steady = stft(tone(1119.84, 0.2, kCount, kAnalysed_hz), kAnalysed_hz);
   const std::vector<float> left = inverse_stft(spectral_subtraction(steady, stationary_spectrum(steady, 2, 800)));
   EXPECT_LT(rms_db(std::span(left).subspan(2000, kCount - 4000)), 20.0 * std::log10(0.2) - 3.01 - 20);
 }
 
 TEST(SpectralSubtraction, OfSilenceNothingIsChanged) {
-  const Stft silence = stft(std::vector<float>(22050, 0.0F), kRate_hz);
-  const Stft noise = stft(white_noise(0.1, 22050, 4), kRate_hz);
+  const Stft silence = stft(std::vector<float>(22050, 0.0F), kAnalysed_hz);
+  const Stft noise = stft(white_noise(0.1, 22050, 4), kAnalysed_hz);
   EXPECT_EQ(power_of(spectral_subtraction(noise, stationary_spectrum(silence, 0, 10))), power_of(noise));
   EXPECT_EQ(power_of(spectral_subtraction(silence, stationary_spectrum(noise, 0, 10))), 0.0);
 }

@@ -6,7 +6,9 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <fstream>
 #include <string>
+#include <string_view>
 
 #include "common/sound/levels.hpp"
 #include "common/sound/resample.hpp"
@@ -31,6 +33,10 @@ void write_foreign(const fs::path& file, int format, int channels, int rate_hz, 
   ASSERT_NE(out, nullptr) << sf_strerror(nullptr);
   sf_writef_float(out, frames.data(), static_cast<sf_count_t>(frames.size()) / channels);
   sf_close(out);
+}
+
+void put(const fs::path& file, std::string_view bytes) {
+  std::ofstream(file, std::ios::binary).write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
 }
 
 constexpr int kPcm16 = SF_FORMAT_WAV | SF_FORMAT_PCM_16;
@@ -91,11 +97,11 @@ TEST(WavFile, RefusesWhatItCannotUse) {
   write_foreign(temp / "flac.wav", SF_FORMAT_AIFF | SF_FORMAT_PCM_16, 1, 44100, second);
   write_foreign(temp / "whole.wav", kPcm16, 1, 44100, second);
   const std::string whole = test::content(temp / "whole.wav");
-  test::write_content(temp / "cut.wav", whole.substr(0, 40000));
-  test::write_content(temp / "header.wav", whole.substr(0, 30));
-  test::write_content(temp / "letters.wav", whole.substr(0, 3));
-  test::write_content(temp / "empty.wav", "");
-  test::write_content(temp / "text.wav", "time_s,level\n0,1\n");
+  put(temp / "cut.wav", whole.substr(0, 40000));
+  put(temp / "header.wav", whole.substr(0, 30));
+  put(temp / "letters.wav", whole.substr(0, 3));
+  put(temp / "empty.wav", "");
+  put(temp / "text.wav", "time_s,level\n0,1\n");
   fs::create_directory(temp / "folder.wav");
 
   struct Wrong {
@@ -141,7 +147,7 @@ TEST(WavFile, AnyCutOfAFileIsRefusedOrShort) {
   ASSERT_TRUE(write_wav(temp / "whole.wav", tone(440, 0.5, 8000, 22050), 22050));
   const std::string whole = test::content(temp / "whole.wav");
   for (std::size_t bytes = 0; bytes < whole.size(); bytes += bytes < 60 ? 1 : 997) {
-    test::write_content(temp / "cut.wav", whole.substr(0, bytes));
+    put(temp / "cut.wav", whole.substr(0, bytes));
     EXPECT_FALSE(read_wav(temp / "cut.wav")) << bytes;
   }
 }

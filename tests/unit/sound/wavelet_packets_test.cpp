@@ -12,7 +12,6 @@
 namespace osteon::sound {
 namespace {
 
-constexpr double kRate_hz = 22050;
 constexpr int kMoments = 10;
 
 // Half of the squared gain of Daubechies' low-pass filter at `turns` of a turn in each sample: with p = cos^2(pi
@@ -30,7 +29,7 @@ double low_part(double turns) {
 // Part of a tone's power in a band: the product of the filters' parts on the way to it. The last filter comes first in
 // the name. Decimation doubles the turns, and mirrors what is beyond half a turn.
 double expected_share(const Packet& packet, double hz) {
-  double turns = hz / kRate_hz, share = 1.0;
+  double turns = hz / kAnalysed_hz, share = 1.0;
   const std::string name = packet_name(packet);
   for (int level = 1; level <= packet.level; ++level) {
     const bool high = name[static_cast<std::size_t>(packet.level - level)] == 'D';
@@ -58,7 +57,7 @@ TEST(WaveletPackets, NamesFollowTheGrayCode) {
 
 TEST(WaveletPackets, BandsAreThoseOfTheFrequencies) {
   // ADAA4 and ADD3 by their letters; 8.5.3 prints 1378-2067 and 8268-9646 Hz.
-  const Band adaa = packet_band({4, 3}, kRate_hz), add = packet_band({3, 4}, kRate_hz);
+  const Band adaa = packet_band({4, 3}, kAnalysed_hz), add = packet_band({3, 4}, kAnalysed_hz);
   EXPECT_NEAR(adaa.from_hz, 2067, 1);
   EXPECT_NEAR(adaa.to_hz, 2756, 1);
   EXPECT_NEAR(add.from_hz, 5512, 1);
@@ -67,9 +66,9 @@ TEST(WaveletPackets, BandsAreThoseOfTheFrequencies) {
 
 TEST(WaveletPackets, AToneLandsInItsBandOfAllThirtyTwo) {
   for (int index = 0; index < 32; ++index) {
-    const Band band = packet_band({5, index}, kRate_hz);
+    const Band band = packet_band({5, index}, kAnalysed_hz);
     const double hz = 0.5 * (band.from_hz + band.to_hz);
-    const WaveletPackets packets = wavelet_packets(tone(hz, 0.4, 44100, kRate_hz), kRate_hz);
+    const WaveletPackets packets = wavelet_packets(tone(hz, 0.4, 44100, kAnalysed_hz), kAnalysed_hz);
     for (int level = 1; level <= kMostLevels; ++level) {
       int largest = 0;
       for (int other = 0; other < 1 << level; ++other) {
@@ -87,7 +86,7 @@ TEST(WaveletPackets, AToneLandsInItsBandOfAllThirtyTwo) {
 TEST(WaveletPackets, EachLevelHasTheEnergyOfTheSignal) {
   for (const std::size_t count : {std::size_t{1}, std::size_t{33}, std::size_t{10000}}) {
     const std::vector<float> noise = white_noise(0.3, count, 5);
-    const WaveletPackets packets = wavelet_packets(noise, kRate_hz);
+    const WaveletPackets packets = wavelet_packets(noise, kAnalysed_hz);
     for (int level = 1; level <= kMostLevels; ++level) {
       double sum = 0;
       for (int index = 0; index < 1 << level; ++index) sum += energy(packets.at({level, index}));
@@ -98,7 +97,7 @@ TEST(WaveletPackets, EachLevelHasTheEnergyOfTheSignal) {
 
 TEST(WaveletPackets, BandsOfALevelSumToTheSignal) {
   const std::vector<float> noise = white_noise(0.3, 5003, 11);
-  const WaveletPackets packets = wavelet_packets(noise, kRate_hz);
+  const WaveletPackets packets = wavelet_packets(noise, kAnalysed_hz);
   std::vector<std::vector<Packet>> divisions{drilling_bands()};
   for (int level = 1; level <= kMostLevels; ++level) {
     divisions.emplace_back();
@@ -113,10 +112,10 @@ TEST(WaveletPackets, BandsOfALevelSumToTheSignal) {
 
 TEST(WaveletPackets, ABandSoundsWhenItsToneDoes) {
   // 300 Hz in the first half, 6200 Hz in the second: the bands of Figure 8.15.
-  std::vector<float> samples = tone(300, 0.3, 44100, kRate_hz);
-  const std::vector<float> high = tone(6200, 0.3, 44100, kRate_hz);
+  std::vector<float> samples = tone(300, 0.3, 44100, kAnalysed_hz);
+  const std::vector<float> high = tone(6200, 0.3, 44100, kAnalysed_hz);
   std::copy(high.begin() + 22050, high.end(), samples.begin() + 22050);
-  const WaveletPackets packets = wavelet_packets(samples, kRate_hz);
+  const WaveletPackets packets = wavelet_packets(samples, kAnalysed_hz);
   const std::vector<float> low_band = band_signal(packets, {4, 0}), high_band = band_signal(packets, {3, 4});
   // A filter of level 4 is 286 samples long.
   const auto first = std::span(low_band).subspan(1000, 20000), second = std::span(low_band).subspan(23000, 20000);
@@ -128,7 +127,7 @@ TEST(WaveletPackets, ABandSoundsWhenItsToneDoes) {
 }
 
 TEST(WaveletPackets, SilenceHasNoShare) {
-  const WaveletPackets packets = wavelet_packets(std::vector<float>(1000, 0.0F), kRate_hz);
+  const WaveletPackets packets = wavelet_packets(std::vector<float>(1000, 0.0F), kAnalysed_hz);
   EXPECT_EQ(energy_share(packets, {5, 3}), 0.0);
   EXPECT_EQ(peak(band_signal(packets, {5, 3})), 0.0);
 }
