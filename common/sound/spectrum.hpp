@@ -1,4 +1,4 @@
-// Average power spectrum of a signal (Welch: Hann windows, half overlapped; Figure 8.8), and measurements on it.
+// Average power spectrum of a signal (Welch 1967: Hann windows, half overlapped; Figure 8.8), and measurements on it.
 #pragma once
 #include <cstddef>
 #include <span>

@@ -39,7 +39,7 @@ struct Stft {
 [[nodiscard]] Stft stft(std::span<const float> samples, double rate_hz, const StftParams& params = {});
 
 // The signal whose transform is closest to `transform` in the sum of squared differences: each frame is windowed again,
-// and the sum is divided by that of the squared windows. Of an unchanged transform, the signal itself.
+// and the sum is divided by that of the squared windows (Griffin 1984). Of an unchanged transform, the signal itself.
 [[nodiscard]] std::vector<float> inverse_stft(const Stft& transform);
 
 // Power of a frame between two frequencies in [from_hz, to_hz): mean square of that part of the signal.

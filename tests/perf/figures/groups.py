@@ -16,6 +16,7 @@ import kernels
 import laws
 import registry
 import rooms
+import sounds
 import viewing
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -259,7 +260,8 @@ def scan(run):
 
 
 GROUPS = {**kernels.GROUPS, **devices.GROUPS, **authentication.GROUPS, **insiders.GROUPS,
-          **feel.GROUPS, **filters.GROUPS, **haptics.GROUPS, **laws.GROUPS, **rooms.GROUPS, **viewing.GROUPS,
+          **feel.GROUPS, **filters.GROUPS, **haptics.GROUPS, **laws.GROUPS, **rooms.GROUPS, **sounds.GROUPS,
+          **viewing.GROUPS,
           "expert": expert, "novice": novice, "rig": rig, "scan": scan, "real_imports": imports.real_imports,
           "import_accuracy": imports.import_accuracy,
           "phantoms": imports.phantoms,

@@ -177,7 +177,7 @@ class AnalyseProgram : public testing::Test {
   [[nodiscard]] fs::path wav() const { return temp_ / "drilling.wav"; }
   [[nodiscard]] test::RunResult analyse_with(std::vector<std::string> arguments) const {
     arguments.insert(arguments.begin(), "analyse");
-    return test::run(OSTEON_AUDIO_PROGRAM, arguments);
+    return test::run(test::program("osteon-audio"), arguments);
   }
 
   test::TempDir temp_;
