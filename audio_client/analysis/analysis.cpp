@@ -110,13 +110,13 @@ const StateSpectrum* spectrum_of(const SoundAnalysis& analysis, sound::DrillingS
   return found == analysis.spectra.end() ? nullptr : &*found;
 }
 
-SoundAnalysis analyse(const sound::WavSound& sound, const AnalysisParams& params) {
+SoundAnalysis analyse(const sound::WavSound& recording, const AnalysisParams& params) {
   SoundAnalysis a;
   a.params = params;
-  a.file_rate_hz = sound.rate_hz, a.file_channels = sound.channels, a.file_bits = sound.bits;
-  a.samples = sound::resampled(sound.samples, sound.rate_hz, a.rate_hz);
+  a.file_rate_hz = recording.rate_hz, a.file_channels = recording.channels, a.file_bits = recording.bits;
+  a.samples = sound::resampled(recording.samples, recording.rate_hz, a.rate_hz);
   a.level_db = sound::rms_db(a.samples);
-  a.peak = sound::peak(sound.samples);
+  a.peak = sound::peak(recording.samples);
   a.whole = sound::power_spectrum(a.samples, a.rate_hz, params.spectrum_window);
   a.spectrogram = spectrogram_of(a);
   a.states = sound::drilling_states(a.samples, a.rate_hz, {.spindle_rpm = params.spindle_rpm, .free = params.free});

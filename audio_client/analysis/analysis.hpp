@@ -1,7 +1,6 @@
 // The analysis of a recorded drilling (8.5): states, spectra, wavelet packets, and what the bone adds to a free drill.
 #pragma once
 #include <optional>
-#include <string>
 #include <vector>
 
 #include "common/sound/drilling_states.hpp"
@@ -74,7 +73,7 @@ struct SoundAnalysis {
 };
 
 // A pure function of both. It takes about 1 s for a minute of sound.
-[[nodiscard]] SoundAnalysis analyse(const sound::WavSound& sound, const AnalysisParams& params);
+[[nodiscard]] SoundAnalysis analyse(const sound::WavSound& recording, const AnalysisParams& params);
 
 // The spectrum of a state, or null.
 [[nodiscard]] const StateSpectrum* spectrum_of(const SoundAnalysis& analysis, sound::DrillingState state);

@@ -28,8 +28,8 @@ __attribute__((format(printf, 1, 2))) std::string formatted(const char* format, 
   return text;
 }
 
-// To a tenth of a millihertz, a thousandth of a decibel and so on: further digits depend on the machine.
-double rounded(double value, double step = 1e-3) { return std::round(value / step) * step; }
+// Further digits say nothing, and may depend on the machine.
+double rounded(double value, double parts = 1e3) { return std::round(value * parts) / parts; }
 
 json level_json(const SoundAnalysis& a, double level_db) {
   json level = {{"db_full_scale", rounded(level_db)}};
@@ -62,7 +62,7 @@ json packets_json(const SoundAnalysis& a) {
                        {"name", sound::packet_name(of.packet)},
                        {"from_hz", rounded(band.from_hz)},
                        {"to_hz", rounded(band.to_hz)},
-                       {"energy_share", rounded(of.share, 1e-6)},
+                       {"energy_share", rounded(of.share, 1e6)},
                        {"rms", level_json(a, of.level_db)}});
   }
   return packets;
@@ -201,7 +201,7 @@ std::string to_json(const SoundAnalysis& a) {
         {"channels", a.file_channels},
         {"bits", a.file_bits},
         {"seconds", rounded(static_cast<double>(a.samples.size()) / a.rate_hz)},
-        {"peak", rounded(a.peak, 1e-6)},
+        {"peak", rounded(a.peak, 1e6)},
         {"level", level_json(a, a.level_db)}}},
       {"analysis_rate_hz", a.rate_hz},
       {"spectrum_window", a.params.spectrum_window},

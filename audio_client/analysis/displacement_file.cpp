@@ -1,8 +1,10 @@
 #include "audio_client/analysis/displacement_file.hpp"
 
 #include <algorithm>
+#include <cstdint>
 #include <string>
 #include <string_view>
+#include <utility>
 
 #include "common/core/bounded_text.hpp"
 #include "common/core/read_number.hpp"

@@ -14,6 +14,7 @@
 #include <set>
 #include <sstream>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "audio_client/analysis/analysis.hpp"
@@ -113,7 +114,8 @@ TEST(SoundAnalysis, RealRecordings) {
   // A geared drill at constant speed.
   EXPECT_EQ(steady.states.size(), 1U) << states_in_words(steady);
   EXPECT_EQ(steady.states.front().state, DrillingState::free);
-  const auto mesh = std::ranges::find(steady.lines, "output mesh", [](const FoundLine& of) { return of.line.name; });
+  const auto mesh = std::ranges::find(steady.lines, std::string_view("output mesh"),
+                                      [](const FoundLine& of) { return of.line.name; });
   EXPECT_NEAR(mesh->line.hz, 1140, 1);
 
   const auto saw = sound::read_wav(*shared / "data/sound/opensfx_40_circular_saw.wav");

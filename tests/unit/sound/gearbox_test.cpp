@@ -32,8 +32,8 @@ TEST(Gearbox, LinesFollowTheSpindle) {
 TEST(Gearbox, MotorsThirdHarmonicLiesWhereItWasHeard) {
   // 8.5.4: about 5500 Hz when running free, 5400 Hz when loaded, and a line near 1800 Hz, at a nominal 1400 rpm.
   const std::vector<GearLine> lines = gear_table(Gearbox{}, 1400);
-  EXPECT_NEAR(std::ranges::find(lines, "commutation x3", &GearLine::name)->hz, 5450, 100);
-  EXPECT_NEAR(std::ranges::find(lines, "commutation", &GearLine::name)->hz, 1800, 30);
+  EXPECT_NEAR(std::ranges::find(lines, std::string_view("commutation x3"), &GearLine::name)->hz, 5450, 100);
+  EXPECT_NEAR(std::ranges::find(lines, std::string_view("commutation"), &GearLine::name)->hz, 1800, 30);
 }
 
 }  // namespace
