@@ -32,19 +32,6 @@ std::optional<sound::TimeSpan> longest(const std::vector<sound::StateSpan>& stat
   return best;
 }
 
-sound::Stft spectrogram_of(const SoundAnalysis& a) {
-  sound::StftParams params{.window = a.params.spectrogram_window,
-                           .hop = a.params.spectrogram_window / 4,
-                           .size = a.params.spectrogram_window};
-  // A long recording has longer windows, so that the frames still overlap.
-  while (a.samples.size() / static_cast<std::size_t>(params.hop) > kMostColumns) {
-    params.window *= 2;
-    params.hop *= 2;
-    params.size *= 2;
-  }
-  return sound::stft(a.samples, a.rate_hz, params);
-}
-
 std::vector<FoundLine> find_lines(const SoundAnalysis& a) {
   const StateSpectrum* free = spectrum_of(a, sound::DrillingState::free);
   const sound::Spectrum& spectrum = free ? free->spectrum : a.whole;
@@ -118,7 +105,7 @@ SoundAnalysis analyse(const sound::WavSound& recording, const AnalysisParams& pa
   a.level_db = sound::rms_db(a.samples);
   a.peak = sound::peak(recording.samples);
   a.whole = sound::power_spectrum(a.samples, a.rate_hz, params.spectrum_window);
-  a.spectrogram = spectrogram_of(a);
+  a.spectrogram = sound::spectrogram(a.samples, a.rate_hz, params.spectrogram_window, kMostColumns);
   a.states = sound::drilling_states(a.samples, a.rate_hz, {.spindle_rpm = params.spindle_rpm, .free = params.free});
   for (int i = 0; i < sound::kDrillingStates; ++i) {
     const auto state = static_cast<sound::DrillingState>(i);

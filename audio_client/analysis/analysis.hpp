@@ -64,7 +64,7 @@ struct SoundAnalysis {
   double level_db = 0, peak = 0;
   sound::Spectrum whole;
   std::vector<StateSpectrum> spectra;  // of each state that occurs, in the order of DrillingState
-  sound::Stft spectrogram;
+  sound::Spectrogram spectrogram;
   std::vector<sound::StateSpan> states;
   std::vector<PacketShare> packets;  // levels 1 to 5
   std::vector<BandInTime> bands;     // those of Figure 8.14

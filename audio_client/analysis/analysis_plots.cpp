@@ -109,18 +109,13 @@ NamedPicture density(const SoundAnalysis& a) {
 NamedPicture spectrogram(const SoundAnalysis& a) {
   constexpr double kRange_db = 80;
   Picture page(kWidth, 420, kPaper);
-  const sound::Stft& s = a.spectrogram;
-  const auto level_db = [&](std::size_t m, std::size_t k) {
-    return sound::power_db(2.0 * s.power_scale * std::norm(s.frame(m)[k]));
-  };
-  double loudest_db = sound::kSilence_db;
-  for (std::size_t m = 0; m < s.frames; ++m)
-    for (std::size_t k = 0; k < s.bins(); ++k) loudest_db = std::max(loudest_db, level_db(m, k));
+  const sound::Spectrogram& s = a.spectrogram;
+  const double loudest_db = sound::power_db(*std::ranges::max_element(s.power));
   Plot plot(page, {kLeft, 24, kPlotWidth, 346}, time_axis(a), {0.0, 0.5 * a.rate_hz, "frequency, Hz"});
   plot.map([&](double x, double y) {
-    const auto m = std::min(s.frames - 1, static_cast<std::size_t>(std::lround(x * s.rate_hz / s.params.hop)));
-    const auto k = std::min(s.bins() - 1, static_cast<std::size_t>(std::lround(y / s.bin_hz())));
-    return heat(1.0 + (level_db(m, k) - loudest_db) / kRange_db);
+    const auto column = std::min(s.columns - 1, static_cast<std::size_t>(x / s.column_s));
+    const auto bin = std::min(s.bins - 1, static_cast<std::size_t>(std::lround(y / s.bin_hz)));
+    return heat(1.0 + (sound::power_db(s.at(column, bin)) - loudest_db) / kRange_db);
   });
   for (const sound::StateSpan& span : a.states) {
     plot.vertical_line(span.from_s, kPaper);
@@ -128,7 +123,7 @@ NamedPicture spectrogram(const SoundAnalysis& a) {
   }
   std::array<char, 96> scale{};
   std::snprintf(scale.data(), scale.size(), "dark: %.0f dB, light: %.0f dB re full scale, each bin of %.0f Hz",
-                loudest_db - kRange_db, loudest_db, s.bin_hz());
+                loudest_db - kRange_db, loudest_db, s.bin_hz);
   page.text(kLeft + 160, 8, scale.data(), kInk);
   return {"spectrogram.png", std::move(page)};
 }

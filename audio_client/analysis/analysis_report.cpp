@@ -89,19 +89,15 @@ std::string density_table(const SoundAnalysis& a) {
   return text;
 }
 
-// A row for each frame, a column for each frequency.
+// A row for each moment, a column for each frequency.
 std::string spectrogram_table(const SoundAnalysis& a) {
-  const sound::Stft& s = a.spectrogram;
+  const sound::Spectrogram& s = a.spectrogram;
   std::string text = "time_s";
-  for (std::size_t k = 0; k < s.bins(); ++k) text += formatted(",%.1f_hz", static_cast<double>(k) * s.bin_hz());
+  for (std::size_t k = 0; k < s.bins; ++k) text += formatted(",%.1f_hz", static_cast<double>(k) * s.bin_hz);
   text += "\n";
-  for (std::size_t m = 0; m < s.frames; ++m) {
-    text += formatted("%.4f", s.time_s(m));
-    const auto bins = s.frame(m);
-    for (std::size_t k = 0; k < bins.size(); ++k) {
-      const double both_signs = k == 0 || k + 1 == bins.size() ? 1.0 : 2.0;
-      text += formatted(",%.1f", sound::power_db(both_signs * s.power_scale * std::norm(bins[k])));
-    }
+  for (std::size_t c = 0; c < s.columns; ++c) {
+    text += formatted("%.4f", static_cast<double>(c) * s.column_s);
+    for (std::size_t k = 0; k < s.bins; ++k) text += formatted(",%.1f", sound::power_db(s.at(c, k)));
     text += "\n";
   }
   return text;

@@ -73,7 +73,7 @@ void add_analyse_command(CLI::App& app, std::function<Result<std::string>()>& ch
   AnalyseArguments& a = *shared;
   CLI::App* command = app.add_subcommand(
       "analyse", "Analyse a recorded drilling: its states, spectra, wavelet packets, and the lines of the gears");
-  command->add_option("FILE", a.file, "PCM WAV of 16, 24 or 32 bits, 22050 to 48000 Hz, 0.25 s to 10 minutes")
+  command->add_option("FILE", a.file, "PCM WAV of 16, 24 or 32 bits, 22050 to 48000 Hz, 0.25 s to 5 minutes")
       ->required();
   command->add_option("--out", a.out,
                       "Folder, made by this command: analysis.json, tables (psd.csv, spectrogram.csv, packets.csv, "

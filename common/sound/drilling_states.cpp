@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <complex>
 #include <limits>
 #include <numbers>
 #include <utility>
@@ -38,21 +39,23 @@ Levels levels_of(std::span<const float> samples, double rate_hz, const StatePara
   StftParams frames{.window = 2, .hop = std::max(1, static_cast<int>(std::lround(frame_s * rate_hz))), .size = 2};
   while (frames.window < 2 * frames.hop) frames.window *= 2;
   frames.size = frames.window;
-  const Stft transform = stft(samples, rate_hz, frames);
+  const double scale = power_scale(frames);
 
   const double spindle_hz = params.spindle_rpm / 60.0;
   const Gearbox gears;
   const std::array<double, 2> lines_hz = {3.0 * kCommutatorSegments * gears.motor() * spindle_hz,
                                           gears.motor_mesh() * spindle_hz};
-  Levels levels{.frame_s = frames.hop / rate_hz, .frames = transform.frames, .power = {}, .motor_and_mesh = {}};
-  for (std::size_t m = 0; m < transform.frames; ++m) {
+  Levels levels{.frame_s = frames.hop / rate_hz, .power = {}, .motor_and_mesh = {}};
+  for_each_frame(samples, frames, [&](std::size_t, std::span<const std::complex<float>> bins) {
     auto& power = levels.power.emplace_back();
     for (std::size_t b = 0; b < kBands; ++b)
-      power[b] = band_power(transform, m, kEdges_hz[b], std::min(kEdges_hz[b + 1], 0.5 * rate_hz));
+      power[b] = scale * band_energy(bins, rate_hz, kEdges_hz[b], kEdges_hz[b + 1]);
     auto& lines = levels.motor_and_mesh.emplace_back();
     // A hand's load changes the speed by some percent.
-    for (std::size_t i = 0; i < 2; ++i) lines[i] = band_power(transform, m, 0.95 * lines_hz[i], 1.05 * lines_hz[i]);
-  }
+    for (std::size_t i = 0; i < 2; ++i)
+      lines[i] = scale * band_energy(bins, rate_hz, 0.95 * lines_hz[i], 1.05 * lines_hz[i]);
+  });
+  levels.frames = levels.power.size();
   return levels;
 }
 

@@ -14,12 +14,12 @@
 namespace osteon::sound {
 
 enum class DrillingState : std::uint8_t {
-  before,      // no drill has run yet
-  free,        // it runs, and cuts nothing
-  cortical,    //
-  cancellous,  //
-  perforation,
-  after,  // it has run, and rests
+  before,       // no drill has run yet
+  free,         // it runs, and cuts nothing
+  cortical,     // it cuts hard bone
+  cancellous,   // it cuts soft bone
+  perforation,  // it breaks through
+  after,        // it has run, and rests
 };
 inline constexpr int kDrillingStates = 6;
 [[nodiscard]] std::string_view name(DrillingState state);

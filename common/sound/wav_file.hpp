@@ -24,7 +24,7 @@ struct WavSound {
 };
 
 inline constexpr int kLowestRate_hz = 22050, kHighestRate_hz = 48000;
-inline constexpr double kShortest_s = 0.25, kLongest_s = 600.0;
+inline constexpr double kShortest_s = 0.25, kLongest_s = 300.0;
 
 // Reads integer PCM of 16, 24 or 32 bits, with one channel, or two of which `channel` says which one is meant. Refuses
 // 8 bits, whose rounding is louder than a quiet room, rates and lengths beyond the limits above, and files that end
