@@ -6,9 +6,9 @@
 #include <sys/stat.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <cstdio>
+#include <ctime>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <set>
@@ -138,12 +138,12 @@ TEST(SoundAnalysis, LongRecordingsAreAnalysedInBoundedTime) {
     random = random * 1664525U + 1013904223U;
     recording.samples.push_back(1e-10F * static_cast<float>(random >> 1U) - 0.1F);
   }
-  const auto begin = std::chrono::steady_clock::now();
+  const std::clock_t begin = std::clock();
   const SoundAnalysis analysis = analyse(recording, {});
-  const std::chrono::duration<double> work = std::chrono::steady_clock::now() - begin;
-  std::printf("analysed 30 s in %.2f s: %.0f times as fast as it sounds\n", work.count(), 30 / work.count());
-  // Twenty times is the goal on a free core; a busy machine with a sanitizer gets a tenth of that.
-  EXPECT_GT(30 / work.count(), 2);
+  const double work_s = static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC;
+  std::printf("analysed 30 s in %.2f s of a processor: %.0f times as fast as it sounds\n", work_s, 30 / work_s);
+  // Twenty times is the goal, which deploy/figures measures. A sanitizer takes most of it.
+  EXPECT_GT(30 / work_s, 2);
   EXPECT_LE(analysis.spectrogram.columns, 2000U);
 }
 
