@@ -1,18 +1,21 @@
-// osteon-audio: joins a room and plays the sound of its tools.
+// osteon-audio: joins a room and plays the sound of its tools, or analyses a recording.
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <cstdio>
 #include <filesystem>
 #include <fstream>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
 #include <thread>
 #include <utility>
 
+#include "audio_client/app/analyse_command.hpp"
 #include "audio_client/net/state_subscription.hpp"
 #include "audio_client/output/audio_output.hpp"
 #include "audio_client/output/reconnecting_output.hpp"
@@ -279,7 +282,10 @@ Result<void> run(const Options& options, const StopSignal& stop) {
 int main(int argc, char** argv) {
   Options options;
   CLI::App app("Plays the sound of a room's tools: it follows speed, load and bone density.", kProgram);
-  app.add_option("--server", options.server, "HOST:PORT of osteon-server")->required();
+  std::function<Result<std::string>()> command;
+  audio::add_analyse_command(app, command);
+  app.require_subcommand(0, 1);
+  app.add_option("--server", options.server, "HOST:PORT of osteon-server; needed to play");
   app.add_option("--room", options.room, "Name of the room; not needed where the server has one");
   app.add_option("--name", options.name, "Who you are, shown to others")->capture_default_str();
   wire::add_credential_options(app, options.credentials);
@@ -296,6 +302,14 @@ int main(int argc, char** argv) {
       ->check(CLI::Range(0.0, 3600.0))
       ->capture_default_str();
   if (const auto code = parse_arguments(app, argc, argv)) return *code;
+  if (command) {
+    const Result<std::string> text = command();
+    if (!text) return log::exit_with(kProgram, text.error());
+    std::fputs(text->c_str(), stdout);
+    return 0;
+  }
+  if (options.server.empty())
+    return log::exit_with(kProgram, {ErrorCode::invalid_input, "--server is required; see osteon-audio --help"});
 
   log::open(kProgram);
   const StopSignal stop;

@@ -2,8 +2,8 @@
 
 #include <cmath>
 
-#include "audio_client/synth/gearbox.hpp"
 #include "common/core/check.hpp"
+#include "common/sound/gearbox.hpp"
 
 namespace osteon::audio {
 namespace {
@@ -13,7 +13,7 @@ namespace {
 constexpr double kFreeLevel = 0.025;
 
 Handpiece geared_drill() {
-  constexpr Gearbox gears;
+  constexpr sound::Gearbox gears;
   Handpiece drill{.kind = HandpieceKind::geared_drill, .teeth = 2, .rated_rpm = 1400, .air_level = 1.4, .partials = {}};
   auto& p = drill.partials;
 
@@ -25,7 +25,7 @@ Handpiece geared_drill() {
   p.push_back({2 * gears.motor(), Source::shaft, 0.10});
 
   // Commutation: the third harmonic is the loudest line of the free-running drill (8.5.4: 5500 Hz, magnetic pole pass).
-  const double commutation = kCommutatorSegments * gears.motor();
+  const double commutation = sound::kCommutatorSegments * gears.motor();
   const double commutation_levels[] = {0.30, 0.10, 1.00, 0.12};
   for (int i = 0; i < 4; ++i) p.push_back({(i + 1) * commutation, Source::motor, commutation_levels[i]});
   for (const int side : {-1, 1}) p.push_back({3 * commutation + side * gears.motor(), Source::motor, 0.18});

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/core/check.hpp"
+
 namespace osteon::sound {
 
 double power_db(double mean_square) {
@@ -28,6 +30,19 @@ double largest_step(std::span<const float> samples) {
     largest = std::max(largest, std::abs(static_cast<double>(samples[i]) - samples[i - 1]));
   }
   return largest;
+}
+
+double sound_level_db(double level_db, double full_scale_pa) {
+  OSTEON_CHECK(full_scale_pa > 0);
+  return level_db + 20.0 * std::log10(full_scale_pa / kReference_pa);
+}
+
+std::vector<double> block_levels_db(std::span<const float> samples, std::size_t block) {
+  OSTEON_CHECK(block >= 1);
+  std::vector<double> levels;
+  for (std::size_t at = 0; at < samples.size(); at += block)
+    levels.push_back(rms_db(samples.subspan(at, std::min(block, samples.size() - at))));
+  return levels;
 }
 
 }  // namespace osteon::sound

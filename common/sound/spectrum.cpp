@@ -1,53 +1,39 @@
 #include "common/sound/spectrum.hpp"
 
-#include <kiss_fftr.h>
-
 #include <algorithm>
 #include <cmath>
-#include <memory>
-#include <numbers>
+#include <complex>
 
 #include "common/core/check.hpp"
+#include "common/sound/fourier.hpp"
 #include "common/sound/levels.hpp"
 
 namespace osteon::sound {
-namespace {
-
-struct FftFree {
-  void operator()(kiss_fftr_state* plan) const { kiss_fftr_free(plan); }
-};
-
-}  // namespace
 
 Spectrum power_spectrum(std::span<const float> samples, double rate_hz, int size) {
   OSTEON_CHECK(size >= 16 && (size & (size - 1)) == 0 && rate_hz > 0);
   const auto n = static_cast<std::size_t>(size);
-  const std::unique_ptr<kiss_fftr_state, FftFree> plan(kiss_fftr_alloc(size, 0, nullptr, nullptr));
-
-  std::vector<float> window(n), frame(n);
-  double window_power = 0;
-  for (std::size_t i = 0; i < n; ++i) {
-    const double w = 0.5 - 0.5 * std::cos(2.0 * std::numbers::pi * static_cast<double>(i) / size);
-    window[i] = static_cast<float>(w);
-    window_power += w * w;
-  }
-
-  Spectrum result{rate_hz / size, std::vector<double>(n / 2 + 1, 0.0)};
-  std::vector<kiss_fft_cpx> bins(n / 2 + 1);
+  RealFft fft(size);
+  const std::vector<float> window = hann_window(size);
+  Spectrum result{rate_hz / size, std::vector<double>(fft.bins(), 0.0)};
+  std::vector<float> frame(n);
+  std::vector<std::complex<float>> bins(fft.bins());
   int frames = 0;
   for (std::size_t start = 0; frames == 0 || start + n <= samples.size(); start += n / 2, ++frames) {
     for (std::size_t i = 0; i < n; ++i) frame[i] = start + i < samples.size() ? window[i] * samples[start + i] : 0.0F;
-    kiss_fftr(plan.get(), frame.data(), bins.data());
-    for (std::size_t k = 0; k <= n / 2; ++k) {
-      const double re = bins[k].r, im = bins[k].i;
+    fft.forward(frame, bins);
+    for (std::size_t k = 0; k < bins.size(); ++k) {
+      const double re = bins[k].real(), im = bins[k].imag();
       result.power[k] += re * re + im * im;
     }
   }
   // Parseval: the two-sided sum of |X|^2 is size * sum (w x)^2. Inner bins represent both signs of the frequency.
-  const double scale = 1.0 / (static_cast<double>(size) * window_power * frames);
+  const double scale = 1.0 / (static_cast<double>(size) * window_energy(window) * frames);
   for (std::size_t k = 0; k <= n / 2; ++k) result.power[k] *= (k == 0 || k == n / 2) ? scale : 2.0 * scale;
   return result;
 }
+
+double density_db(const Spectrum& spectrum, std::size_t bin) { return power_db(spectrum.power[bin] / spectrum.bin_hz); }
 
 double band_db(const Spectrum& spectrum, double from_hz, double to_hz) {
   double sum = 0;

@@ -1,11 +1,13 @@
-// Average power spectrum of a signal (Welch: Hann windows, half overlapped), and measurements on it.
+// Average power spectrum of a signal (Welch 1967: Hann windows, half overlapped; Figure 8.8), and measurements on it.
 #pragma once
+#include <cstddef>
 #include <span>
 #include <vector>
 
 namespace osteon::sound {
 
-// One-sided: power[k] belongs to k * bin_hz. The sum is the mean square of the signal.
+// One-sided: power[k] belongs to k * bin_hz, for k = 0 ... size / 2. The sum is the mean square of the signal. A sine
+// of amplitude a has a^2 / 3 in its own bin and a^2 / 12 in each neighbour, if its frequency is that of a bin.
 struct Spectrum {
   double bin_hz = 0;
   std::vector<double> power;
@@ -13,6 +15,9 @@ struct Spectrum {
 
 // `size`: samples in a window, a power of two. A signal shorter than one window is padded with silence.
 [[nodiscard]] Spectrum power_spectrum(std::span<const float> samples, double rate_hz, int size = 4096);
+
+// Power spectral density of a bin, dB re full scale squared per hertz.
+[[nodiscard]] double density_db(const Spectrum& spectrum, std::size_t bin);
 
 // Level of all power in [from_hz, to_hz).
 [[nodiscard]] double band_db(const Spectrum& spectrum, double from_hz, double to_hz);

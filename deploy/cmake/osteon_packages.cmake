@@ -41,6 +41,7 @@ pkg_check_modules(sdl2 REQUIRED IMPORTED_TARGET sdl2)
 pkg_check_modules(rtaudio REQUIRED IMPORTED_TARGET rtaudio)
 pkg_check_modules(sndfile REQUIRED IMPORTED_TARGET sndfile)
 pkg_check_modules(kissfft REQUIRED IMPORTED_TARGET kissfft-float)
+pkg_check_modules(samplerate REQUIRED IMPORTED_TARGET samplerate)
 
 # Debian's OpenVDB has its find module beside the library instead of a package file.
 list(APPEND CMAKE_MODULE_PATH /usr/lib/${CMAKE_LIBRARY_ARCHITECTURE}/cmake/OpenVDB)

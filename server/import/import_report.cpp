@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "common/runtime/files.hpp"
+#include "common/runtime/new_folder.hpp"
 #include "server/import/ct_case.hpp"
-#include "server/import/new_folder.hpp"
 #include "server/import/report_html.hpp"
 #include "server/import/report_pictures.hpp"
 

@@ -10,8 +10,8 @@
 
 #include "common/imaging/calibration.hpp"
 #include "common/runtime/files.hpp"
+#include "common/runtime/new_folder.hpp"
 #include "server/import/label_export.hpp"
-#include "server/import/new_folder.hpp"
 
 namespace osteon::import {
 namespace {

@@ -8,7 +8,7 @@
 #include "common/core/digest.hpp"
 #include "common/imaging/moved_volume.hpp"
 #include "common/runtime/files.hpp"
-#include "server/import/new_folder.hpp"
+#include "common/runtime/new_folder.hpp"
 #include "server/import/volume_file.hpp"
 
 namespace osteon::import {

@@ -12,7 +12,7 @@
 #include <utility>
 #include <vector>
 
-#include "server/import/new_folder.hpp"
+#include "common/runtime/new_folder.hpp"
 
 namespace osteon::import {
 namespace {

@@ -8,8 +8,8 @@
 #include <utility>
 
 #include "common/runtime/files.hpp"
+#include "common/runtime/new_folder.hpp"
 #include "common/subvolumes/subvolume_file.hpp"
-#include "server/import/new_folder.hpp"
 
 namespace osteon::import {
 namespace {

@@ -13,6 +13,7 @@ LAYERS = {
     "phantoms": {"core", "geometry", "tools", "field", "volume"},
     "surface": {"core", "geometry", "tools", "field"},
     "mechanics": {"core", "geometry", "tools", "field"},
+    "picture": {"core"},
     "sound": {"core"},
     "runtime": {"core"},
     "subvolumes": {"core", "geometry", "tools", "field", "volume", "surface", "runtime"},

@@ -72,6 +72,8 @@ class Help(unittest.TestCase):
         self.assertIn("create", completed("osteon-server", "rooms", ""))
         self.assertIn("--case-hash", completed("osteon-server", "rooms", "create", "--ca"))
         self.assertIn("plan", completed("osteon-haptic", "pl"))
+        self.assertIn("analyse", completed("osteon-audio", "an"))
+        self.assertIn("--displacement", completed("osteon-audio", "analyse", "--di"))
         self.assertIn("--timeout", completed("osteon-viewer", "--ti"))
         self.assertIn("--language", completed("osteon", "--la"))
         self.assertEqual(completed("osteon-viewer", "--nothing-like-it"), [])

@@ -17,6 +17,7 @@ import kernels
 import laws
 import registry
 import rooms
+import sounds
 import viewing
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -261,7 +262,7 @@ def scan(run):
 
 GROUPS = {**kernels.GROUPS, **devices.GROUPS, **authentication.GROUPS, **insiders.GROUPS,
           **feel.GROUPS, **filters.GROUPS, **haptics.GROUPS, **hours.GROUPS, **laws.GROUPS, **rooms.GROUPS,
-          **viewing.GROUPS,
+          **sounds.GROUPS, **viewing.GROUPS,
           "expert": expert, "novice": novice, "rig": rig, "scan": scan, "real_imports": imports.real_imports,
           "import_accuracy": imports.import_accuracy,
           "phantoms": imports.phantoms,

@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "audio_client/synth/drill_synth.hpp"
-#include "audio_client/synth/gearbox.hpp"
 #include "audio_client/synth/limiter.hpp"
+#include "common/sound/gearbox.hpp"
 #include "common/sound/levels.hpp"
 #include "common/sound/spectrum.hpp"
 #include "common/sound/tones.hpp"
@@ -65,9 +65,9 @@ class SpindleSpeed : public testing::TestWithParam<double> {};
 TEST_P(SpindleSpeed, PartialsAreLockedToTheSpindle) {
   const double spindle_hz = GetParam() / 60.0;
   const std::vector<float> samples = steady(cortical_drill(GetParam()));
-  constexpr Gearbox gears;
-  for (const double ratio :
-       {gears.output_mesh(), 2 * gears.output_mesh(), gears.motor_mesh(), 3 * kCommutatorSegments * gears.motor()}) {
+  constexpr sound::Gearbox gears;
+  for (const double ratio : {gears.output_mesh(), 2 * gears.output_mesh(), gears.motor_mesh(),
+                             3 * sound::kCommutatorSegments * gears.motor()}) {
     const double hz = ratio * spindle_hz;
     // One second of a line in noise: far more accurate than the 1 Hz of a plain spectrum.
     EXPECT_NEAR(sound::find_tone(samples, kRate_hz, hz - 15, hz + 15).hz, hz, 0.05) << "ratio " << ratio;
@@ -80,7 +80,7 @@ TEST(DrillSound, PitchDroopsWithTheSpindleUnderLoad) {
   DrillSynth synth = make_synth();
   static_cast<void>(play(synth, free_drill(1000), 0.75));
   const std::vector<float> samples = play(synth, cortical_drill(955), 1.0);
-  const double mesh_hz = Gearbox{}.output_mesh() * 1000 / 60.0;
+  const double mesh_hz = sound::Gearbox{}.output_mesh() * 1000 / 60.0;
   const std::vector<double> track = sound::track_tone(samples, kRate_hz, mesh_hz, {.reach = 0.06});
   ASSERT_FALSE(track.empty());
   EXPECT_NEAR(track.back() / mesh_hz, 0.955, 1e-3);
@@ -112,11 +112,11 @@ TEST(DrillSound, CorticalIsBrighterThanCancellous) {
 
 TEST(DrillSound, MotorLeadsWhereThereIsLoadOrNoneAndTheGearsBetween) {
   // 8.5.4: free and cortical, 5500 Hz is stronger than 4000 Hz. Cancellous, it is the other way round.
-  constexpr Gearbox gears;
+  constexpr sound::Gearbox gears;
   const auto lead_db = [&](const CuttingState& state) {
     const std::vector<float> samples = steady(state);
     const double spindle_hz = state.spindle_rpm / 60.0;
-    return sound::tone_db(samples, kRate_hz, 3 * kCommutatorSegments * gears.motor() * spindle_hz) -
+    return sound::tone_db(samples, kRate_hz, 3 * sound::kCommutatorSegments * gears.motor() * spindle_hz) -
            sound::tone_db(samples, kRate_hz, gears.motor_mesh() * spindle_hz);
   };
   EXPECT_GT(lead_db(free_drill(1400)), 1);

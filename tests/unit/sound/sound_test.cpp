@@ -54,6 +54,47 @@ TEST(Levels, LargestStepIsTheSlopeOfASineAndFindsAClick) {
   EXPECT_GT(largest_step(samples), 0.48);
 }
 
+TEST(Levels, OnePascalIsNinetyFourDecibels) {
+  // A sine whose amplitude is full scale, of 1 Pa RMS.
+  EXPECT_NEAR(sound_level_db(rms_db(sine(1000, 1.0, 48000)), std::sqrt(2.0)), 93.979, 1e-3);
+  EXPECT_NEAR(sound_level_db(0.0, kReference_pa), 0.0, 1e-12);
+}
+
+TEST(Levels, BlocksHaveTheirOwnLevels) {
+  std::vector<float> samples = sine(1000, 0.5, 4800);
+  const std::vector<float> louder = sine(1000, 1.0, 4800);
+  samples.insert(samples.end(), louder.begin(), louder.end());
+  samples.resize(9600 + 10, 0.0F);
+  const std::vector<double> levels = block_levels_db(samples, 4800);
+  ASSERT_EQ(levels.size(), 3U);
+  EXPECT_NEAR(levels[0], -9.031, 1e-3);
+  EXPECT_NEAR(levels[1], -3.010, 1e-3);
+  EXPECT_EQ(levels[2], kSilence_db);
+}
+
+TEST(Spectrum, SineHasAThirdOfItsSquareInItsBin) {
+  // The Hann window's spectrum is 1/2 in its middle and 1/4 beside it, and its mean square is 3/8.
+  constexpr int kSize = 4096, kBin = 300;
+  const Spectrum spectrum = power_spectrum(sine(kBin * kRate_hz / kSize, 0.6, 48000), kRate_hz, kSize);
+  EXPECT_NEAR(spectrum.power[kBin], 0.36 / 3, 1e-6);
+  EXPECT_NEAR(spectrum.power[kBin - 1], 0.36 / 12, 1e-6);
+  EXPECT_NEAR(spectrum.power[kBin + 1], 0.36 / 12, 1e-6);
+  EXPECT_LT(spectrum.power[kBin + 2], 1e-10);
+  EXPECT_NEAR(density_db(spectrum, kBin), 10 * std::log10(0.12 / (kRate_hz / kSize)), 1e-4);
+}
+
+TEST(Spectrum, WhiteNoiseHasOneDensityEverywhere) {
+  std::mt19937 random(3);
+  std::normal_distribution<float> normal(0.0F, 0.1F);
+  std::vector<float> noise(960000);
+  for (float& x : noise) x = normal(random);
+  const Spectrum spectrum = power_spectrum(noise, kRate_hz, 1024);
+  // Twice the variance over the rate. 1874 frames that overlap by half give a bin to 3 %, so 0.6 dB are five sigmas.
+  const double expected_db = 10 * std::log10(2 * 0.01 / kRate_hz);
+  for (std::size_t k = 2; k + 2 < spectrum.power.size(); ++k)
+    ASSERT_NEAR(density_db(spectrum, k), expected_db, 0.65) << k;
+}
+
 TEST(Spectrum, PowerSumsToTheMeanSquare) {
   std::mt19937 random(1);
   std::normal_distribution<float> normal(0.0F, 0.1F);

@@ -1,4 +1,4 @@
-#include "server/import/picture.hpp"
+#include "common/picture/picture.hpp"
 
 #include <png.h>
 
@@ -6,7 +6,7 @@
 #include <array>
 #include <cmath>
 
-namespace osteon::import {
+namespace osteon::picture {
 namespace {
 
 constexpr int kGlyphWidth = 5, kGlyphHeight = 7, kGlyphStep = 6;
@@ -120,4 +120,4 @@ Result<std::string> Picture::png() const {
   return bytes;
 }
 
-}  // namespace osteon::import
+}  // namespace osteon::picture

@@ -1,7 +1,9 @@
 // Characteristic frequencies of a drill's hand piece, as multiples of the spindle's frequency (8.1-8.4, Table 8.1).
 #pragma once
+#include <string_view>
+#include <vector>
 
-namespace osteon::audio {
+namespace osteon::sound {
 
 // A planetary set with a fixed ring: the sun drives, the planet carrier is driven.
 struct PlanetarySet {
@@ -33,4 +35,16 @@ struct Gearbox {
 // first at 1784 Hz. There 8.5.4 finds the motor's 5400-5500 Hz and 1800 Hz.
 inline constexpr int kCommutatorSegments = 5;
 
-}  // namespace osteon::audio
+// A row of Table 8.1, or a harmonic of the motor's commutation (8.4).
+struct GearLine {
+  std::string_view name;
+  double ratio = 1;  // to the spindle's frequency
+  double hz = 0;
+};
+
+// The three shafts, both gear meshes with the spin of their planets, and harmonics: of the output mesh, which are heard
+// up to the fourth (8.5.4), and of the commutation, of which the third is the loudest.
+// `spindle_rpm`: speed of the output shaft, revolutions a minute, above 0.
+[[nodiscard]] std::vector<GearLine> gear_table(const Gearbox& gears, double spindle_rpm);
+
+}  // namespace osteon::sound

@@ -5,11 +5,11 @@
 
 #include "common/core/result.hpp"
 
-namespace osteon::import {
+namespace osteon {
 
 // Calls `write` with an empty folder beside `folder`, and then gives it that name. If anything fails, removes
 // what was written. Errors: exists, internal (disk), and those of `write`.
 [[nodiscard]] Result<void> write_new_folder(const std::filesystem::path& folder,
                                             const std::function<Result<void>(const std::filesystem::path&)>& write);
 
-}  // namespace osteon::import
+}  // namespace osteon

@@ -1,10 +1,10 @@
-#include "server/import/new_folder.hpp"
+#include "common/runtime/new_folder.hpp"
 
 #include <unistd.h>
 
 #include <string>
 
-namespace osteon::import {
+namespace osteon {
 
 namespace fs = std::filesystem;
 
@@ -31,4 +31,4 @@ Result<void> write_new_folder(const fs::path& folder, const std::function<Result
   return written;
 }
 
-}  // namespace osteon::import
+}  // namespace osteon

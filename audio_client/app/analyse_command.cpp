@@ -1,0 +1,106 @@
+#include "audio_client/app/analyse_command.hpp"
+
+#include <CLI/CLI.hpp>
+
+#include <array>
+#include <cstdio>
+#include <ctime>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "audio_client/analysis/analysis.hpp"
+#include "audio_client/analysis/analysis_report.hpp"
+#include "audio_client/analysis/displacement_file.hpp"
+
+namespace osteon::audio {
+namespace {
+
+struct AnalyseArguments {
+  std::string file, channel, displacement, out;
+  std::vector<double> free_s;
+  double spindle_rpm = 1400, displacement_start_s = 0;
+  std::optional<double> full_scale_pa;
+};
+
+Result<std::optional<sound::TimeSpan>> free_span(const AnalyseArguments& a, double seconds) {
+  if (a.free_s.empty()) return std::optional<sound::TimeSpan>();
+  const sound::TimeSpan span{a.free_s[0], a.free_s[1]};
+  if (span.from_s < 0 || span.to_s > seconds || span.to_s - span.from_s < 0.1)
+    return bad_input("--free must be two times within the " + std::to_string(seconds) + " s of " + a.file +
+                     ", the second at least 0.1 s after the first");
+  return std::optional(span);
+}
+
+Result<std::string> run_analysis(const AnalyseArguments& a) {
+  // What would be found after the work is found before it.
+  std::error_code ignored;
+  if (!a.out.empty() && std::filesystem::exists(a.out, ignored))
+    return failure(ErrorCode::exists, a.out + " is already there; give --out another name or remove it first");
+  std::optional<sound::Channel> channel;
+  if (!a.channel.empty()) channel = sound::channel_of(a.channel);
+  const auto recording = sound::read_wav(a.file, channel);
+  if (!recording) return tl::unexpected(recording.error());
+  const auto free = free_span(a, recording->seconds());
+  if (!free) return tl::unexpected(free.error());
+  std::vector<DisplacementRow> displacement;
+  if (!a.displacement.empty()) {
+    auto rows = read_displacement(a.displacement, a.displacement_start_s);
+    if (!rows) return tl::unexpected(rows.error());
+    displacement = std::move(*rows);
+  }
+
+  AnalysisParams params;
+  params.spindle_rpm = a.spindle_rpm;
+  params.full_scale_pa = a.full_scale_pa;
+  params.free = *free;
+  // Of the processor, because other programs may run beside this one.
+  const std::clock_t begin = std::clock();
+  const SoundAnalysis analysis = analyse(*recording, params);
+  const double work_s = static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC;
+  std::array<char, 96> speed{};
+  std::snprintf(speed.data(), speed.size(), "\nanalysed   in %.3f s of a processor, %.0f times as fast as it sounds\n",
+                work_s, recording->seconds() / work_s);
+  std::string text = to_text(analysis) + speed.data();
+  if (a.out.empty()) return text;
+  if (auto written = write_analysis(analysis, displacement, a.out); !written) return tl::unexpected(written.error());
+  return text + "written    " + a.out + ": analysis.json, tables (*.csv) and pictures (*.png)\n";
+}
+
+}  // namespace
+
+void add_analyse_command(CLI::App& app, std::function<Result<std::string>()>& chosen) {
+  const auto shared = std::make_shared<AnalyseArguments>();
+  AnalyseArguments& a = *shared;
+  CLI::App* command = app.add_subcommand(
+      "analyse", "Analyse a recorded drilling: its states, spectra, wavelet packets, and the lines of the gears");
+  command->add_option("FILE", a.file, "PCM WAV of 16, 24 or 32 bits, 22050 to 48000 Hz, 0.25 s to 5 minutes")
+      ->required();
+  command->add_option("--out", a.out,
+                      "Folder, made by this command: analysis.json, tables (psd.csv, spectrogram.csv, packets.csv, "
+                      "states.csv, gears.csv, bands.csv), a picture of each, and the sound of the bone alone "
+                      "(difference.wav)");
+  command->add_option("--channel", a.channel, "Of a stereo recording: left, right or mean")
+      ->check(CLI::IsMember({"left", "right", "mean"}));
+  command->add_option("--rpm", a.spindle_rpm, "Speed of the spindle, which says where the lines of the gears are")
+      ->check(CLI::Range(10.0, 100000.0))
+      ->capture_default_str();
+  command
+      ->add_option("--free", a.free_s,
+                   "FROM TO: seconds in which the drill ran free; by default the longest such state that is found")
+      ->expected(2);
+  command->add_option("--displacement", a.displacement,
+                      "CSV with time_s and displacement_mm, or a session log of osteon-haptic: drawn over the bands");
+  command
+      ->add_option("--displacement-start", a.displacement_start_s,
+                   "Time in that table at which the recording begins, seconds")
+      ->check(CLI::Range(-1e6, 1e6))
+      ->capture_default_str();
+  command
+      ->add_option("--full-scale-pa", a.full_scale_pa,
+                   "Sound pressure of full scale, Pa, from a calibrated recording: also prints levels re 20 uPa")
+      ->check(CLI::Range(1e-6, 1e6));
+  command->callback([shared, &chosen] { chosen = [shared] { return run_analysis(*shared); }; });
+}
+
+}  // namespace osteon::audio
