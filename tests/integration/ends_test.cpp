@@ -1,8 +1,11 @@
 // What the window lets go of: connections that nobody takes, and data that nobody draws.
 #include <gtest/gtest.h>
+#include <unistd.h>
 
+#include <array>
 #include <atomic>
 #include <chrono>
+#include <fstream>
 #include <memory>
 #include <string>
 #include <thread>
@@ -19,6 +22,13 @@ namespace {
 using namespace std::chrono_literals;
 
 class WindowEnds : public test::WindowBench {};
+
+double resident_mb() {
+  std::ifstream pages("/proc/self/statm");
+  double all = 0.0, resident = 0.0;
+  pages >> all >> resident;
+  return resident * static_cast<double>(::sysconf(_SC_PAGESIZE)) / 1e6;
+}
 
 // The threads of a connection write into the link's queue. A room may be left before the GUI thread has the connection.
 TEST_F(WindowEnds, AConnectionThatNobodyTookEndsBeforeItsQueue) {
@@ -61,6 +71,19 @@ TEST_F(WindowEnds, AHiddenWindowKeepsNothingOfWhatArrives) {
   trigger("undo");
   ASSERT_TRUE(until([&] { return !cut(); })) << problem();
   EXPECT_FALSE(view_->updater()->any_arrivals());
+}
+
+// The C library keeps free memory below memory that is still used. Room after room, this would add up.
+TEST_F(WindowEnds, ARoomThatIsLeftGivesFreeMemoryBack) {
+  open();
+  using Block = std::array<char, 1000>;
+  std::vector<std::unique_ptr<Block>> freed(100'000);
+  for (auto& block : freed) block = std::make_unique<Block>();
+  const auto above = std::make_unique<Block>();
+  freed.clear();
+  const double before_mb = resident_mb();
+  trigger("start_page");
+  EXPECT_LT(resident_mb(), before_mb - 80.0);
 }
 
 }  // namespace
