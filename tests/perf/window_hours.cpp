@@ -114,21 +114,29 @@ class Person : public WindowBench {
     return false;
   }
   // A busy window may have said something else by the time that anybody looks.
-  template <class Act>
-  bool says(const QString& sentence, Act act) {
+  template <class Act, class Wait>
+  bool says(const QString& sentence, Act act, Wait wait) {
     bool heard = false;
     const auto listening = QObject::connect(window_->statusBar(), &QStatusBar::messageChanged,
                                             [&](const QString& said) { heard |= said.startsWith(sentence); });
     act();
-    const bool in_time = sees(sentence.toUtf8().constData(), [&] { return heard; });
+    const bool in_time = sees(sentence.toUtf8().constData(), [&] {
+      if (!heard) wait();
+      return heard;
+    });
     QObject::disconnect(listening);
     return in_time;
+  }
+  template <class Act>
+  bool says(const QString& sentence, Act act) {
+    return says(sentence, act, [] {});
   }
   [[nodiscard]] double depth_mm() const { return QLocale().toDouble(label("depth").section(' ', 0, 0)); }
   [[nodiscard]] bool holds_chosen();
   bool finds_places();
   bool drills(const QPoint& at);
   bool takes_other_diameter(bool larger);
+  bool undoes();
   bool saves();
 
   std::vector<QPoint> places_;  // on the bone, seen from above
@@ -202,6 +210,16 @@ bool Person::takes_other_diameter(bool larger) {
   return sees("another diameter", [&] { return view_->pointer().tool() != before && holds_chosen(); });
 }
 
+// A push that was let go before it cut leaves nothing to undo. Then the one before it goes.
+bool Person::undoes() {
+  Clock::time_point pressed;
+  return says(
+      "Undone.", [&] { trigger("undo"), pressed = Clock::now(); },
+      [&] {
+        if (Clock::now() - pressed > 15s) trigger("undo"), pressed = Clock::now();
+      });
+}
+
 bool Person::saves() {
   const std::filesystem::path file = desk_->temp() / ("skull-" + std::to_string(++saved_) + ".osteon");
   const DialogAnswer name(QString::fromStdString(file.string()));
@@ -216,7 +234,7 @@ bool Person::works(bool larger) {
   for (std::size_t hole = 0; hole < kHoles; ++hole)
     if (!drills(places_[hole])) return false;
   if (!sees("a hole", [&] { return cut(); })) return false;
-  if (!says("Undone.", [&] { trigger("undo"); })) return false;
+  if (!undoes()) return false;
   if (!takes_other_diameter(larger) || !drills(places_[kHoles])) return false;
   const DialogAnswer name("Holes");
   return says("Marked.", [&] { trigger("mark"); }) && name.given() && saves() && !HasFailure();
@@ -225,7 +243,7 @@ bool Person::works(bool larger) {
 bool Person::undoes_all() {
   trigger("put_down");
   for (int push = 0; push < 100 && cut(); ++push) {
-    if (!says("Undone.", [&] { trigger("undo"); })) return false;
+    if (!undoes()) return false;
     QTest::qWait(500);  // until the surface has come
   }
   return sees("whole bone", [&] { return !cut(); });
