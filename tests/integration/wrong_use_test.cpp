@@ -484,11 +484,11 @@ TEST_F(WrongUse, SessionsAreNamedInTheLanguageOfTheWindow) {
   fs::copy(desk_->bone(), example_folder(pelvis), fs::copy_options::recursive);
   const QDateTime when(QDate(2026, 3, 5), QTime(14, 7));
   remember({pelvis.title, example_folder(pelvis), "/a", {}, when});
-  EXPECT_TRUE(recent_entries().front().title.startsWith("Pelvis, a phantom, "))
+  EXPECT_TRUE(recent_entries().front().title.startsWith("Pelvis, a phantom\n"))
       << recent_entries().front().title.toStdString();
   speak("de");
   const QString german = recent_entries().front().title;
-  EXPECT_TRUE(german.startsWith("Becken, Phantom, ")) << german.toStdString();
+  EXPECT_TRUE(german.startsWith("Becken, Phantom\n")) << german.toStdString();
   EXPECT_TRUE(german.contains("05.03.")) << german.toStdString();
   // So is what the audio client says, which speaks English.
   const QString sound =
