@@ -1,0 +1,59 @@
+#include "common/sound/spectral_model.hpp"
+
+#include "common/core/check.hpp"
+#include "common/sound/oscillator.hpp"
+#include "common/sound/random.hpp"
+
+namespace osteon::sound {
+namespace {
+
+// Adds one partial, whose phase begins at `turns` and follows its frequency. It begins and ends within a hop.
+void add_partial(std::span<float> sound, const Partial& partial, int hop, double turns, double rate_hz) {
+  Sinusoid from = partial.points.front();
+  from.amplitude = 0;
+  std::ptrdiff_t at = (static_cast<std::ptrdiff_t>(partial.first) - 1) * hop;
+  for (const Sinusoid& to : partial.points) {
+    turns = add_linear(sound, at, hop, from, to, turns, rate_hz);
+    from = to;
+    at += hop;
+  }
+  Sinusoid death = from;
+  death.amplitude = 0;
+  add_linear(sound, at, hop, from, death, turns, rate_hz);
+}
+
+}  // namespace
+
+SpectralAnalysis spectral_analysis(std::span<const float> samples, double rate_hz, const SpectralParams& params) {
+  OSTEON_CHECK(rate_hz > 0);
+  SpectralAnalysis a;
+  a.impacts = impacts(samples, rate_hz, params.transients);
+  a.partials = continued(frame_peaks(samples, rate_hz, params.partials, a.impacts), rate_hz, params.partials);
+  a.sines = sound_with_phases(a.partials, rate_hz, params.partials.hop, samples.size());
+  a.residual.assign(samples.begin(), samples.end());
+  for (std::size_t i = 0; i < samples.size(); ++i) a.residual[i] -= a.sines[i];
+  a.model = {.rate_hz = rate_hz, .samples = samples.size(), .hop = params.partials.hop, .partials = {}, .noise = {},
+             .transients = transients_at(samples, rate_hz, a.impacts, params.transients)};
+  for (const Partial& partial : a.partials) a.model.partials.push_back(knots_of(partial, params.tolerance));
+  a.model.noise = noise_model(a.residual, rate_hz, params.noise);
+  return a;
+}
+
+std::vector<float> resynthesised_partials(const SpectralModel& model, std::uint64_t seed) {
+  Random random(seed);
+  std::vector<float> sound(model.samples, 0.0F);
+  for (const std::vector<Knot>& knots : model.partials)
+    add_partial(sound, partial_of(knots), model.hop, random.unit(), model.rate_hz);
+  return sound;
+}
+
+std::vector<float> resynthesised(const SpectralModel& model, std::uint64_t seed) {
+  std::vector<float> sound = resynthesised_partials(model, seed);
+  // Another stream of numbers than that of the phases.
+  const std::vector<float> noise = noise_sound(model.noise, model.samples, ~seed);
+  for (std::size_t i = 0; i < sound.size(); ++i) sound[i] += noise[i];
+  put_transients(sound, model.transients, model.rate_hz);
+  return sound;
+}
+
+}  // namespace osteon::sound

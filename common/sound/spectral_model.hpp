@@ -1,0 +1,51 @@
+// Spectral modelling synthesis (8.21 to 8.23; Serra 1990): a sound as partials, noise, and the samples of its impacts.
+#pragma once
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "common/sound/line_segments.hpp"
+#include "common/sound/noise_model.hpp"
+#include "common/sound/partials.hpp"
+#include "common/sound/transients.hpp"
+
+namespace osteon::sound {
+
+struct SpectralParams {
+  PartialParams partials;
+  SegmentTolerance tolerance;
+  NoiseParams noise;
+  TransientParams transients;
+};
+
+// What is left of a sound when its phases are forgotten. Small enough to be kept for each tool.
+struct SpectralModel {
+  double rate_hz = 0;
+  std::size_t samples = 0;
+  int hop = 128;                            // samples between the frames of the partials
+  std::vector<std::vector<Knot>> partials;  // each with one knot or more
+  NoiseModel noise;
+  std::vector<Transient> transients;
+};
+
+// x = sines + residual: exact but for the rounding of the last bit of each sample.
+struct SpectralAnalysis {
+  std::vector<std::size_t> impacts;  // samples
+  std::vector<Partial> partials;     // with the phases of the frames
+  std::vector<float> sines;          // the partials' sound with these phases
+  std::vector<float> residual;       // in time
+  SpectralModel model;
+};
+
+[[nodiscard]] SpectralAnalysis spectral_analysis(std::span<const float> samples, double rate_hz,
+                                                 const SpectralParams& params = {});
+
+// s(t) = sum over the partials of A(t) cos(theta(t)) + e(t) (8.21): oscillators, whose phases begin at random, noise,
+// and the impacts in place of both. The same seed gives the same sound.
+[[nodiscard]] std::vector<float> resynthesised(const SpectralModel& model, std::uint64_t seed);
+
+// The partials alone.
+[[nodiscard]] std::vector<float> resynthesised_partials(const SpectralModel& model, std::uint64_t seed);
+
+}  // namespace osteon::sound
