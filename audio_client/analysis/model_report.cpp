@@ -66,8 +66,9 @@ std::string to_text(const ModelReport& report) {
   text += line("noise      %zu frames of %zu levels\n", model.noise.frames, model.noise.points_hz.size());
   text += line("impacts    %zu, %.1f %% of the sound is kept as samples\n", model.transients.size(),
                model.samples > 0 ? 100.0 * static_cast<double>(stored) / static_cast<double>(model.samples) : 0.0);
-  text += line("model      %.1f KB, %.0f %% of the samples in 16 bits\n\n", 1e-3 * static_cast<double>(report.bytes.size()),
-               50.0 * static_cast<double>(report.bytes.size()) / static_cast<double>(model.samples));
+  text +=
+      line("model      %.1f KB, %.0f %% of the samples in 16 bits\n\n", 1e-3 * static_cast<double>(report.bytes.size()),
+           50.0 * static_cast<double>(report.bytes.size()) / static_cast<double>(model.samples));
   text += line("%-22s %8s %12s %12s %10s\n", "", "snr_db", "psd_lsd_db", "mel_lsd_db", "env10ms_db");
   for (const Likeness& row : report.rows)
     text += line("%-22s %8.2f %12.2f %12.2f %10.2f\n", row.what.c_str(), row.snr_db, row.psd_lsd_db, row.mel_lsd_db,

@@ -27,8 +27,7 @@ std::vector<Knot> knots_of(const Partial& partial, const SegmentTolerance& toler
   OSTEON_CHECK(tolerance.level_db > 0 && tolerance.hz > 0);
   std::vector<Knot> all;
   for (const Sinusoid& point : partial.points)
-    all.push_back(
-        {partial.first + all.size(), point.hz, 20.0 * std::log10(std::max(point.amplitude, kQuietest))});
+    all.push_back({partial.first + all.size(), point.hz, 20.0 * std::log10(std::max(point.amplitude, kQuietest))});
   if (all.size() < 3) return all;
   std::vector<Knot> knots{all.front()};
   std::vector<std::size_t> ends{all.size() - 1};  // of the segments to come, the nearest last

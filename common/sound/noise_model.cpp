@@ -46,8 +46,8 @@ std::vector<double> noise_points_hz(double rate_hz, const NoiseParams& params) {
 }
 
 NoiseModel noise_model(std::span<const float> residual, double rate_hz, const NoiseParams& params) {
-  NoiseModel model{.rate_hz = rate_hz, .window = params.window, .points_hz = noise_points_hz(rate_hz, params),
-                   .levels_db = {}};
+  NoiseModel model{
+      .rate_hz = rate_hz, .window = params.window, .points_hz = noise_points_hz(rate_hz, params), .levels_db = {}};
   model.frames = residual.size() / model.hop() + 2;
   const std::size_t points = model.points_hz.size();
   RealFft fft(params.window);
@@ -64,7 +64,8 @@ NoiseModel noise_model(std::span<const float> residual, double rate_hz, const No
   for (std::size_t m = 0; m < model.frames; ++m) {
     for (std::size_t i = 0; i < frame.size(); ++i) {
       const std::size_t at = m * model.hop() + i;  // of the signal, half a window later
-      frame[i] = at >= model.hop() && at - model.hop() < residual.size() ? window[i] * residual[at - model.hop()] : 0.0F;
+      frame[i] =
+          at >= model.hop() && at - model.hop() < residual.size() ? window[i] * residual[at - model.hop()] : 0.0F;
     }
     fft.forward(frame, bins);
     for (std::size_t p = 0; p < points; ++p) {

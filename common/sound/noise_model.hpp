@@ -18,7 +18,7 @@ struct NoiseModel {
   int window = 256;
   std::vector<double> points_hz;  // from 0 to half of the rate
   std::size_t frames = 0;
-  std::vector<float> levels_db;   // frames rows: power spectral density at each point, dB re full scale^2 / Hz
+  std::vector<float> levels_db;  // frames rows: power spectral density at each point, dB re full scale^2 / Hz
 
   [[nodiscard]] std::size_t hop() const { return static_cast<std::size_t>(window) / 2; }
 };

@@ -22,8 +22,8 @@ namespace osteon::sound {
 void add_cubic(std::span<float> sound, std::ptrdiff_t begin, int count, const Sinusoid& from, const Sinusoid& to,
                double rate_hz);
 
-// The same without phases of the points: the phase begins at `turns` and follows the frequency, which goes along a line.
-// Returns the turns at the end, within 0 ... 1.
+// The same without phases of the points: the phase begins at `turns` and follows the frequency, which goes along a
+// line. Returns the turns at the end, within 0 ... 1.
 double add_linear(std::span<float> sound, std::ptrdiff_t begin, int count, const Sinusoid& from, const Sinusoid& to,
                   double turns, double rate_hz);
 

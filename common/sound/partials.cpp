@@ -111,7 +111,8 @@ std::vector<float> sound_with_phases(std::span<const Partial> partials, double r
     add_cubic(sound, begin - hop, hop, birth, points.front(), rate_hz);
     for (std::size_t i = 0; i + 1 < points.size(); ++i)
       add_cubic(sound, begin + static_cast<std::ptrdiff_t>(i) * hop, hop, points[i], points[i + 1], rate_hz);
-    add_cubic(sound, begin + (static_cast<std::ptrdiff_t>(points.size()) - 1) * hop, hop, points.back(), death, rate_hz);
+    add_cubic(sound, begin + (static_cast<std::ptrdiff_t>(points.size()) - 1) * hop, hop, points.back(), death,
+              rate_hz);
   }
   return sound;
 }

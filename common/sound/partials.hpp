@@ -9,12 +9,12 @@
 namespace osteon::sound {
 
 struct PartialParams {
-  int window = 1000;               // samples of a frame, even
-  int hop = 128;                   // samples from one frame to the next
+  int window = 1000;  // samples of a frame, even
+  int hop = 128;      // samples from one frame to the next
   PeakParams peaks;
-  double step_hz = 20.0;           // a partial moves by at most step_hz + step_part f in a hop
+  double step_hz = 20.0;  // a partial moves by at most step_hz + step_part f in a hop
   double step_part = 0.005;
-  double shortest_s = 0.02;        // shorter partials are left to the residual
+  double shortest_s = 0.02;  // shorter partials are left to the residual
 };
 
 // A sinusoid over successive frames. Point i belongs to sample (first + i) * hop.
@@ -24,16 +24,16 @@ struct Partial {
 };
 
 // The peaks of the frames 0 ... samples / hop, whose middles are at the samples m * hop. `cuts`, in order, are samples
-// that no frame looks across, such as an impact: ringing has not begun before. A frame that would reach beyond the signal
-// or across a cut is moved to the side, and its phases are carried to its middle by their frequencies. Where too little
-// is left for that, the frame is shorter, and where that has under 32 samples, it has no peaks.
+// that no frame looks across, such as an impact: ringing has not begun before. A frame that would reach beyond the
+// signal or across a cut is moved to the side, and its phases are carried to its middle by their frequencies. Where too
+// little is left for that, the frame is shorter, and where that has under 32 samples, it has no peaks.
 [[nodiscard]] std::vector<std::vector<Sinusoid>> frame_peaks(std::span<const float> samples, double rate_hz,
                                                              const PartialParams& params,
                                                              std::span<const std::size_t> cuts = {});
 
 // Peak continuation: from frame to frame, the closest pair of a partial and a peak is joined first, then the next
-// closest, within the step. A partial without a peak dies, and a peak without a partial is born. Short partials are left
-// out. Partials are in the order of their births, then of their frequencies.
+// closest, within the step. A partial without a peak dies, and a peak without a partial is born. Short partials are
+// left out. Partials are in the order of their births, then of their frequencies.
 [[nodiscard]] std::vector<Partial> continued(std::span<const std::vector<Sinusoid>> frames, double rate_hz,
                                              const PartialParams& params);
 

@@ -32,7 +32,11 @@ SpectralAnalysis spectral_analysis(std::span<const float> samples, double rate_h
   a.sines = sound_with_phases(a.partials, rate_hz, params.partials.hop, samples.size());
   a.residual.assign(samples.begin(), samples.end());
   for (std::size_t i = 0; i < samples.size(); ++i) a.residual[i] -= a.sines[i];
-  a.model = {.rate_hz = rate_hz, .samples = samples.size(), .hop = params.partials.hop, .partials = {}, .noise = {},
+  a.model = {.rate_hz = rate_hz,
+             .samples = samples.size(),
+             .hop = params.partials.hop,
+             .partials = {},
+             .noise = {},
              .transients = transients_at(samples, rate_hz, a.impacts, params.transients)};
   for (const Partial& partial : a.partials) a.model.partials.push_back(knots_of(partial, params.tolerance));
   a.model.noise = noise_model(a.residual, rate_hz, params.noise);

@@ -117,8 +117,8 @@ Result<void> get_partials(Reader& in, SpectralModel& model, const std::string& f
       const std::uint64_t hops = in.get(1);
       frame += hops;
       if ((hops > 0) != (i > 0) || frame >= frames)
-        return damaged(file, outside("the frame of knot " + std::to_string(i) + " of partial " + std::to_string(p), frame,
-                                     "after the one before and below " + std::to_string(frames)));
+        return damaged(file, outside("the frame of knot " + std::to_string(i) + " of partial " + std::to_string(p),
+                                     frame, "after the one before and below " + std::to_string(frames)));
       Knot knot{.frame = frame};
       knot.hz = static_cast<double>(in.get(2)) * hz_step(model.rate_hz);
       knot.level_db = kLoudest_db - static_cast<double>(in.get(1)) / kStepsPerLevel_db;
@@ -167,8 +167,8 @@ Result<void> get_transients(Reader& in, SpectralModel& model, const std::string&
     all += samples;
     const std::string name = "transient " + std::to_string(t);
     if (transient.begin + samples > model.samples)
-      return damaged(file, outside("the end of " + name, transient.begin + samples,
-                                   "at most " + std::to_string(model.samples)));
+      return damaged(
+          file, outside("the end of " + name, transient.begin + samples, "at most " + std::to_string(model.samples)));
     if (static_cast<double>(samples) > kLongestTransient_s * model.rate_hz)
       return damaged(file, outside("the number of samples of " + name, samples, "20 ms at most"));
     if (static_cast<double>(all) > kMostTransientPart * static_cast<double>(model.samples))

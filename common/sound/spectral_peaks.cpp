@@ -77,7 +77,8 @@ std::vector<PeakFinder::Line> PeakFinder::pick() const {
   const double least = std::pow(0.25 * window_ * std::pow(10.0, params_.threshold_db / 20.0), 2.0);
   std::vector<int> tops;
   for (std::size_t k = 2; k + 2 < power_.size(); ++k)
-    if (power_[k] > least && power_[k] > power_[k - 1] && power_[k] >= power_[k + 1]) tops.push_back(static_cast<int>(k));
+    if (power_[k] > least && power_[k] > power_[k - 1] && power_[k] >= power_[k + 1])
+      tops.push_back(static_cast<int>(k));
   const auto louder = [&](int a, int b) {
     const float pa = power_[static_cast<std::size_t>(a)], pb = power_[static_cast<std::size_t>(b)];
     return pa != pb ? pa > pb : a < b;

@@ -50,9 +50,8 @@ std::vector<std::size_t> impacts(std::span<const float> samples, double rate_hz,
   const auto most = static_cast<std::size_t>(params.most_part * static_cast<double>(samples.size())) / length;
   std::vector<std::size_t> kept;
   for (const Impact& impact : found) {
-    const bool apart = std::ranges::all_of(kept, [&](std::size_t other) {
-      return (other > impact.at ? other - impact.at : impact.at - other) >= length;
-    });
+    const bool apart = std::ranges::all_of(
+        kept, [&](std::size_t other) { return (other > impact.at ? other - impact.at : impact.at - other) >= length; });
     if (kept.size() < most && apart) kept.push_back(impact.at);
   }
   std::ranges::sort(kept);

@@ -11,12 +11,12 @@ inline constexpr double kLongestTransient_s = 0.020;
 inline constexpr double kMostTransientPart = 0.1;
 
 struct TransientParams {
-  double block_s = 0.003;      // over which levels are compared
-  double before_s = 0.030;     // the loudest block within this time before an impact ...
-  double rise_db = 9.0;        // ... is so much quieter
-  double range_db = 30.0;      // impacts this far below the loudest block do not count
-  double length_s = 0.020;     // kept of each, at most kLongestTransient_s
-  double most_part = 0.1;      // of the recording, at most kMostTransientPart: the impacts with the largest rises
+  double block_s = 0.003;   // over which levels are compared
+  double before_s = 0.030;  // the loudest block within this time before an impact ...
+  double rise_db = 9.0;     // ... is so much quieter
+  double range_db = 30.0;   // impacts this far below the loudest block do not count
+  double length_s = 0.020;  // kept of each, at most kLongestTransient_s
+  double most_part = 0.1;   // of the recording, at most kMostTransientPart: the impacts with the largest rises
 };
 
 // A transient begins so long before its impact, and is faded in over that time.
