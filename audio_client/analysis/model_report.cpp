@@ -46,7 +46,7 @@ ModelReport model_report(const sound::WavSound& recording, int refinements, std:
   const auto kept = sound::model_from_bytes(report.bytes, "the model");
   OSTEON_CHECK(kept.has_value());
   report.sound = sound::resynthesised(*kept, seed);
-  std::vector<float> with_phases = sound::noise_sound(kept->noise, original.size(), ~seed);
+  std::vector<float> with_phases = sound::resynthesised_noise(*kept, seed);
   for (std::size_t i = 0; i < original.size(); ++i) with_phases[i] += report.analysis.sines[i];
   sound::put_transients(with_phases, kept->transients, kAnalysisRate_hz);
   report.rows = {likeness("sines, with phases", original, report.analysis.sines),
@@ -63,7 +63,9 @@ std::string to_text(const ModelReport& report) {
   for (const sound::Transient& transient : model.transients) stored += transient.samples.size();
   std::string text = line("recording  %.2f s, modelled at %d Hz\n", seconds, kAnalysisRate_hz);
   text += line("partials   %zu of %zu knots\n", model.partials.size(), knots);
-  text += line("noise      %zu frames of %zu levels\n", model.noise.frames, model.noise.points_hz.size());
+  for (const sound::NoiseModel& noise : model.noise)
+    text += line("noise      %zu frames of %zu levels, %.0f to %.0f Hz\n", noise.frames, noise.points_hz.size(),
+                 noise.params.from_hz, noise.params.to_hz);
   text += line("impacts    %zu, %.1f %% of the sound is kept as samples\n", model.transients.size(),
                model.samples > 0 ? 100.0 * static_cast<double>(stored) / static_cast<double>(model.samples) : 0.0);
   text +=

@@ -14,11 +14,28 @@
 namespace osteon::sound {
 namespace {
 
-std::vector<float> sine_window(int size) {
+// A frame with less of its window left than this has no level.
+constexpr double kLeastLeft = 0.02;
+
+// Its squares, half a window apart, sum to one, and it leaks less than a sine: the window of Vorbis (Xiph 2020).
+std::vector<float> noise_window(int size) {
   std::vector<float> window(static_cast<std::size_t>(size));
-  for (std::size_t i = 0; i < window.size(); ++i)
-    window[i] = static_cast<float>(std::sin(std::numbers::pi * (static_cast<double>(i) + 0.5) / size));
+  for (std::size_t i = 0; i < window.size(); ++i) {
+    const double sine = std::sin(std::numbers::pi * (static_cast<double>(i) + 0.5) / size);
+    window[i] = static_cast<float>(std::sin(0.5 * std::numbers::pi * sine * sine));
+  }
   return window;
+}
+
+// First bin of the layer, and the one after its last.
+struct BinRange {
+  std::size_t begin = 0, end = 0;
+};
+BinRange bins_of(double rate_hz, const NoiseParams& params) {
+  const double bin_hz = rate_hz / params.window;
+  const std::size_t all = static_cast<std::size_t>(params.window) / 2 + 1;
+  const auto at = [&](double hz) { return static_cast<std::size_t>(std::ceil(hz / bin_hz - 1e-9)); };
+  return {at(params.from_hz), params.to_hz > 0.5 * rate_hz - 1e-6 ? all : std::min(all, at(params.to_hz))};
 }
 
 // Share of point i at a frequency: a tent from its neighbours on either side.
@@ -32,50 +49,64 @@ double share(const std::vector<double>& points_hz, std::size_t i, double hz) {
 }  // namespace
 
 std::vector<double> noise_points_hz(double rate_hz, const NoiseParams& params) {
-  const double bin_hz = rate_hz / params.window, top_hz = 0.5 * rate_hz;
-  const int bins = params.window / 2;
-  OSTEON_CHECK(params.window >= 32 && params.points >= 2 && params.points <= bins + 1);
-  // So many points a bin apart, that the next ratio is at least a bin.
-  std::vector<double> points{0.0};
-  for (int left = params.points - 1; left > 0; --left) {
+  const double bin_hz = rate_hz / params.window;
+  OSTEON_CHECK(params.window >= 32 && params.from_hz >= 0 && params.to_hz <= 0.5 * rate_hz + 1e-6);
+  OSTEON_CHECK(params.points >= 2 && params.to_hz - params.from_hz >= (params.points - 1) * bin_hz - 1e-6);
+  std::vector<double> points{params.from_hz};
+  for (int left = params.points - 1; left > 1; --left) {
     const double last = points.back();
-    const double ratio_step = last > 0 ? last * (std::pow(top_hz / last, 1.0 / left) - 1.0) : 0.0;
-    points.push_back(left == 1 ? top_hz : last + std::max(bin_hz, ratio_step));
+    const double ratio_step = last > 0 ? last * (std::pow(params.to_hz / last, 1.0 / left) - 1.0) : 0.0;
+    // At most so far that the others can still be a bin apart.
+    points.push_back(std::min(last + std::max(bin_hz, ratio_step), params.to_hz - (left - 1) * bin_hz));
   }
+  points.push_back(params.to_hz);
   return points;
 }
 
-NoiseModel noise_model(std::span<const float> residual, double rate_hz, const NoiseParams& params) {
-  NoiseModel model{
-      .rate_hz = rate_hz, .window = params.window, .points_hz = noise_points_hz(rate_hz, params), .levels_db = {}};
-  model.frames = residual.size() / model.hop() + 2;
+std::size_t noise_frames(std::size_t samples, const NoiseParams& params) {
+  return samples / (static_cast<std::size_t>(params.window) / 2) + 2;
+}
+
+NoiseModel noise_model(std::span<const float> residual, double rate_hz, const NoiseParams& params,
+                       std::span<const float> weight) {
+  OSTEON_CHECK(weight.empty() || weight.size() == residual.size());
+  NoiseModel model{.rate_hz = rate_hz,
+                   .params = params,
+                   .points_hz = noise_points_hz(rate_hz, params),
+                   .frames = noise_frames(residual.size(), params),
+                   .levels_db = {}};
   const std::size_t points = model.points_hz.size();
+  const BinRange range = bins_of(rate_hz, params);
   RealFft fft(params.window);
-  const std::vector<float> window = sine_window(params.window);
-  // Power density of a bin: |X|^2 over the rate and the window's energy, twice for both signs of the frequency.
-  const double scale = 2.0 / (rate_hz * window_energy(window));
+  const std::vector<float> window = noise_window(params.window);
+  const double energy = window_energy(window);
   std::vector<float> shares(points * fft.bins());
   for (std::size_t p = 0; p < points; ++p)
-    for (std::size_t k = 0; k < fft.bins(); ++k)
+    for (std::size_t k = range.begin; k < range.end; ++k)
       shares[p * fft.bins() + k] =
           static_cast<float>(share(model.points_hz, p, static_cast<double>(k) * rate_hz / params.window));
   std::vector<float> frame(window.size());
   std::vector<std::complex<float>> bins(fft.bins());
   for (std::size_t m = 0; m < model.frames; ++m) {
+    double left = 0;  // of the window's energy
     for (std::size_t i = 0; i < frame.size(); ++i) {
       const std::size_t at = m * model.hop() + i;  // of the signal, half a window later
-      frame[i] =
-          at >= model.hop() && at - model.hop() < residual.size() ? window[i] * residual[at - model.hop()] : 0.0F;
+      const bool inside = at >= model.hop() && at - model.hop() < residual.size();
+      frame[i] = inside ? window[i] * residual[at - model.hop()] : 0.0F;
+      const double w = window[i] * (weight.empty() || !inside ? 1.0F : weight[at - model.hop()]);
+      left += w * w;
     }
     fft.forward(frame, bins);
+    // Power density of a bin: |X|^2 over the rate and the window's energy, twice for both signs of the frequency.
+    const double scale = left > kLeastLeft * energy ? 2.0 / (rate_hz * left) : 0.0;
     for (std::size_t p = 0; p < points; ++p) {
-      double sum = 0, weight = 0;
-      for (std::size_t k = 0; k < fft.bins(); ++k) {
+      double sum = 0, all = 1e-12;
+      for (std::size_t k = range.begin; k < range.end; ++k) {
         const double w = shares[p * fft.bins() + k];
         sum += w * std::norm(bins[k]);
-        weight += w;
+        all += w;
       }
-      model.levels_db.push_back(static_cast<float>(power_db(scale * sum / weight)));
+      model.levels_db.push_back(static_cast<float>(power_db(scale * sum / all)));
     }
   }
   return model;
@@ -83,19 +114,20 @@ NoiseModel noise_model(std::span<const float> residual, double rate_hz, const No
 
 std::vector<float> noise_sound(const NoiseModel& model, std::size_t samples, std::uint64_t seed) {
   std::vector<float> sound(samples, 0.0F);
-  RealFft fft(model.window);
-  const std::vector<float> window = sine_window(model.window);
+  const BinRange range = bins_of(model.rate_hz, model.params);
+  RealFft fft(model.params.window);
+  const std::vector<float> window = noise_window(model.params.window);
   Random random(seed);
   std::vector<float> frame(window.size());
   std::vector<std::complex<float>> bins(fft.bins());
   const std::size_t points = model.points_hz.size();
   // A spectrum of magnitude A has the mean square A^2 / window^2 summed over both signs of the frequency.
-  const double scale = 0.5 * model.rate_hz * model.window;
+  const double scale = 0.5 * model.rate_hz * model.params.window;
   for (std::size_t m = 0; m < model.frames; ++m) {
     const auto levels = std::span(model.levels_db).subspan(m * points, points);
     std::size_t right = 1;
-    for (std::size_t k = 0; k < bins.size(); ++k) {
-      const double hz = static_cast<double>(k) * model.rate_hz / model.window;
+    for (std::size_t k = range.begin; k < range.end; ++k) {
+      const double hz = static_cast<double>(k) * model.rate_hz / model.params.window;
       while (right + 1 < points && model.points_hz[right] < hz) ++right;
       const double left_hz = model.points_hz[right - 1], right_hz = model.points_hz[right];
       const double part = std::clamp((hz - left_hz) / (right_hz - left_hz), 0.0, 1.0);

@@ -15,19 +15,6 @@ using std::numbers::pi;
 
 constexpr std::size_t kShortestFrame = 32;
 
-// The stretch of the signal between two cuts that has sample `at`.
-struct Stretch {
-  std::size_t begin = 0, end = 0;
-};
-Stretch stretch_at(std::size_t at, std::size_t samples, std::span<const std::size_t> cuts) {
-  Stretch s{0, samples};
-  for (const std::size_t cut : cuts) {
-    if (cut <= at) s.begin = std::max(s.begin, cut);
-    if (cut > at) s.end = std::min(s.end, cut);
-  }
-  return s;
-}
-
 struct Pair {
   double apart_hz = 0;
   std::size_t partial = 0, peak = 0;
@@ -43,11 +30,12 @@ std::vector<std::vector<Sinusoid>> frame_peaks(std::span<const float> samples, d
   std::vector<std::vector<Sinusoid>> frames(samples.size() / hop + 1);
   for (std::size_t m = 0; m < frames.size(); ++m) {
     const std::size_t middle = m * hop;
-    const Stretch stretch = stretch_at(middle, samples.size(), cuts);
-    const std::size_t size = std::min(window, (stretch.end - stretch.begin) / 2 * 2);
+    std::size_t end = samples.size();  // of what the frame may see
+    for (const std::size_t cut : cuts)
+      if (cut > middle) end = std::min(end, cut);
+    const std::size_t size = std::min(window, end / 2 * 2);
     if (size < kShortestFrame) continue;
-    const std::size_t ideal = middle > size / 2 ? middle - size / 2 : 0;
-    const std::size_t begin = std::clamp(ideal, stretch.begin, stretch.end - size);
+    const std::size_t begin = std::min(middle > size / 2 ? middle - size / 2 : 0, end - size);
     auto finder = finders.find(size);
     if (finder == finders.end())
       finder = finders.emplace(size, PeakFinder(static_cast<int>(size), rate_hz, params.peaks)).first;

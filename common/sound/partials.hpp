@@ -23,10 +23,10 @@ struct Partial {
   std::vector<Sinusoid> points;
 };
 
-// The peaks of the frames 0 ... samples / hop, whose middles are at the samples m * hop. `cuts`, in order, are samples
-// that no frame looks across, such as an impact: ringing has not begun before. A frame that would reach beyond the
-// signal or across a cut is moved to the side, and its phases are carried to its middle by their frequencies. Where too
-// little is left for that, the frame is shorter, and where that has under 32 samples, it has no peaks.
+// The peaks of the frames 0 ... samples / hop, whose middles are at the samples m * hop. `cuts` are samples at which
+// something new begins, such as ringing after an impact: a frame with its middle before a cut sees nothing beyond it. A
+// frame that would reach beyond a cut or the signal is moved to the side, and its phases are carried to its middle by
+// their frequencies. Where too little is left for that, the frame is shorter, and below 32 samples it has no peaks.
 [[nodiscard]] std::vector<std::vector<Sinusoid>> frame_peaks(std::span<const float> samples, double rate_hz,
                                                              const PartialParams& params,
                                                              std::span<const std::size_t> cuts = {});

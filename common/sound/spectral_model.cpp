@@ -22,6 +22,20 @@ void add_partial(std::span<float> sound, const Partial& partial, int hop, double
   add_linear(sound, at, hop, from, death, turns, rate_hz);
 }
 
+// The residual without what the impacts' samples have of it.
+std::vector<NoiseModel> noise_layers(const SpectralAnalysis& a, double rate_hz, const SpectralParams& params) {
+  std::vector<float> weight(a.residual.size(), 1.0F), rest = a.residual;
+  for (const Transient& transient : a.model.transients) {
+    const std::vector<float> flanks = transient_weight(transient.samples.size(), rate_hz);
+    for (std::size_t i = 0; i < flanks.size(); ++i) weight[transient.begin + i] *= 1.0F - flanks[i];
+  }
+  for (std::size_t i = 0; i < rest.size(); ++i) rest[i] *= weight[i];
+  NoiseParams low = params.low_noise, high = params.high_noise;
+  low.to_hz = high.from_hz = params.noise_split_hz;
+  high.to_hz = 0.5 * rate_hz;
+  return {noise_model(rest, rate_hz, low, weight), noise_model(rest, rate_hz, high, weight)};
+}
+
 }  // namespace
 
 SpectralAnalysis spectral_analysis(std::span<const float> samples, double rate_hz, const SpectralParams& params) {
@@ -39,23 +53,25 @@ SpectralAnalysis spectral_analysis(std::span<const float> samples, double rate_h
              .noise = {},
              .transients = transients_at(samples, rate_hz, a.impacts, params.transients)};
   for (const Partial& partial : a.partials) a.model.partials.push_back(knots_of(partial, params.tolerance));
-  a.model.noise = noise_model(a.residual, rate_hz, params.noise);
+  a.model.noise = noise_layers(a, rate_hz, params);
   return a;
 }
 
-std::vector<float> resynthesised_partials(const SpectralModel& model, std::uint64_t seed) {
-  Random random(seed);
+std::vector<float> resynthesised_noise(const SpectralModel& model, std::uint64_t seed) {
   std::vector<float> sound(model.samples, 0.0F);
-  for (const std::vector<Knot>& knots : model.partials)
-    add_partial(sound, partial_of(knots), model.hop, random.unit(), model.rate_hz);
+  for (std::size_t layer = 0; layer < model.noise.size(); ++layer) {
+    // Another stream of numbers for each layer.
+    const std::vector<float> noise = noise_sound(model.noise[layer], model.samples, seed ^ (layer + 1) << 32U);
+    for (std::size_t i = 0; i < sound.size(); ++i) sound[i] += noise[i];
+  }
   return sound;
 }
 
 std::vector<float> resynthesised(const SpectralModel& model, std::uint64_t seed) {
-  std::vector<float> sound = resynthesised_partials(model, seed);
-  // Another stream of numbers than that of the phases.
-  const std::vector<float> noise = noise_sound(model.noise, model.samples, ~seed);
-  for (std::size_t i = 0; i < sound.size(); ++i) sound[i] += noise[i];
+  std::vector<float> sound = resynthesised_noise(model, seed);
+  Random random(seed);
+  for (const std::vector<Knot>& knots : model.partials)
+    add_partial(sound, partial_of(knots), model.hop, random.unit(), model.rate_hz);
   put_transients(sound, model.transients, model.rate_hz);
   return sound;
 }

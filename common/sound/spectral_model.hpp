@@ -15,7 +15,10 @@ namespace osteon::sound {
 struct SpectralParams {
   PartialParams partials;
   SegmentTolerance tolerance;
-  NoiseParams noise;
+  // Low tones are closer than short frames can tell, and blows shorter than long frames can tell.
+  double noise_split_hz = 1200;
+  NoiseParams low_noise{.window = 1024, .points = 32};
+  NoiseParams high_noise{.window = 256, .points = 26};
   TransientParams transients;
 };
 
@@ -25,7 +28,7 @@ struct SpectralModel {
   std::size_t samples = 0;
   int hop = 128;                            // samples between the frames of the partials
   std::vector<std::vector<Knot>> partials;  // each with one knot or more
-  NoiseModel noise;
+  std::vector<NoiseModel> noise;            // layers, which add up
   std::vector<Transient> transients;
 };
 
@@ -45,7 +48,7 @@ struct SpectralAnalysis {
 // and the impacts in place of both. The same seed gives the same sound.
 [[nodiscard]] std::vector<float> resynthesised(const SpectralModel& model, std::uint64_t seed);
 
-// The partials alone.
-[[nodiscard]] std::vector<float> resynthesised_partials(const SpectralModel& model, std::uint64_t seed);
+// The noise alone.
+[[nodiscard]] std::vector<float> resynthesised_noise(const SpectralModel& model, std::uint64_t seed);
 
 }  // namespace osteon::sound

@@ -7,6 +7,7 @@
 
 #include "common/core/check.hpp"
 #include "common/core/digest.hpp"
+#include "common/sound/levels.hpp"
 #include "common/sound/wav_file.hpp"
 
 namespace osteon::sound {
@@ -20,6 +21,7 @@ constexpr std::size_t kMostHops = 255;  // between two knots
 constexpr double kFull = 32767.0;
 // Partials at a time, on average: a small file must not cost hours of oscillators.
 constexpr std::uint64_t kMostPartials = 1000;
+constexpr std::uint64_t kMostLayers = 8;
 
 class Writer {
  public:
@@ -132,28 +134,48 @@ Result<void> get_partials(Reader& in, SpectralModel& model, const std::string& f
   return {};
 }
 
-Result<void> get_noise(Reader& in, SpectralModel& model, const std::string& file) {
-  NoiseParams params;
-  params.window = static_cast<int>(in.get(2));
-  params.points = static_cast<int>(in.get(2));
-  if (!in.whole()) return {};
+// Whether noise_points_hz() has points for these.
+Result<void> check_noise(const NoiseParams& params, double rate_hz, const std::string& file) {
   const auto window = static_cast<unsigned>(params.window);
   if (!std::has_single_bit(window) || window < 32 || window > 8192)
     return damaged(file, outside("the window of its noise", window, "a power of two, 32 to 8192"));
-  if (params.points < 2 || params.points > params.window / 2)
+  if (!(params.from_hz >= 0 && params.from_hz < params.to_hz && params.to_hz <= 0.5 * rate_hz))
+    return damaged(file, "its noise has no frequencies from 0 Hz to half of its rate");
+  const double most = (params.to_hz - params.from_hz) * params.window / rate_hz + 1;
+  if (params.points < 2 || params.points > most)
     return damaged(file, outside("the number of points of its noise", static_cast<std::uint64_t>(params.points),
-                                 "2 to " + std::to_string(params.window / 2)));
-  NoiseModel& noise = model.noise;
-  noise.rate_hz = model.rate_hz, noise.window = params.window;
-  noise.points_hz = noise_points_hz(model.rate_hz, params);
-  noise.frames = model.samples / noise.hop() + 2;
-  const std::size_t levels = noise.frames * noise.points_hz.size();
-  if (levels > in.left())
-    return damaged(file, outside("the number of levels of its noise", levels,
-                                 "at most the " + std::to_string(in.left()) + " bytes that the file has left"));
-  for (std::size_t i = 0; i < levels; ++i) {
-    const auto level = static_cast<int>(in.get(1));
-    noise.levels_db.push_back(level == kNoNoise ? -200.0F : static_cast<float>(-level / kNoiseSteps_db));
+                                 "2 to " + std::to_string(static_cast<int>(most))));
+  return {};
+}
+
+Result<void> get_noise(Reader& in, SpectralModel& model, const std::string& file) {
+  const std::uint64_t layers = in.get(1);
+  if (layers > kMostLayers)
+    return damaged(file,
+                   outside("the number of layers of its noise", layers, "at most " + std::to_string(kMostLayers)));
+  for (std::uint64_t l = 0; l < layers; ++l) {
+    NoiseParams params;
+    params.window = static_cast<int>(in.get(2));
+    params.points = static_cast<int>(in.get(2));
+    params.from_hz = 0.5 * static_cast<double>(in.get(4));
+    params.to_hz = 0.5 * static_cast<double>(in.get(4));
+    if (!in.whole()) return {};
+    if (auto usable = check_noise(params, model.rate_hz, file); !usable) return usable;
+    NoiseModel noise{.rate_hz = model.rate_hz,
+                     .params = params,
+                     .points_hz = noise_points_hz(model.rate_hz, params),
+                     .frames = noise_frames(model.samples, params),
+                     .levels_db = {}};
+    const std::size_t levels = noise.frames * noise.points_hz.size();
+    if (levels > in.left())
+      return damaged(file, outside("the number of levels of its noise", levels,
+                                   "at most the " + std::to_string(in.left()) + " bytes that the file has left"));
+    for (std::size_t i = 0; i < levels; ++i) {
+      const auto level = static_cast<int>(in.get(1));
+      noise.levels_db.push_back(level == kNoNoise ? static_cast<float>(kSilence_db)
+                                                  : static_cast<float>(-level / kNoiseSteps_db));
+    }
+    model.noise.push_back(std::move(noise));
   }
   return {};
 }
@@ -211,9 +233,15 @@ std::string bytes_of(const SpectralModel& model) {
   out.put(static_cast<std::uint64_t>(model.hop), 2);
   out.put(model.partials.size(), 4);
   for (const std::vector<Knot>& knots : model.partials) put_partial(out, knots, model.rate_hz);
-  out.put(static_cast<std::uint64_t>(model.noise.window), 2);
-  out.put(model.noise.points_hz.size(), 2);
-  for (const float level : model.noise.levels_db) out.put(rounded(-level * kNoiseSteps_db, kNoNoise), 1);
+  out.put(model.noise.size(), 1);
+  for (const NoiseModel& noise : model.noise) {
+    out.put(static_cast<std::uint64_t>(noise.params.window), 2);
+    out.put(noise.points_hz.size(), 2);
+    // Half of the rate may be half a hertz.
+    out.put(rounded(2.0 * noise.params.from_hz, UINT32_MAX), 4);
+    out.put(rounded(2.0 * noise.params.to_hz, UINT32_MAX), 4);
+    for (const float level : noise.levels_db) out.put(rounded(-level * kNoiseSteps_db, kNoNoise), 1);
+  }
   out.put(model.transients.size(), 2);
   for (const Transient& transient : model.transients) {
     out.put(transient.begin, 4);

@@ -14,9 +14,11 @@
 namespace osteon::sound {
 namespace {
 
+constexpr NoiseParams kWhole{.window = 256, .points = 32, .from_hz = 0, .to_hz = 0.5 * kAnalysed_hz};
+
 TEST(NoiseModel, WhiteNoiseKeepsItsDensity) {
   const std::vector<float> noise = white_noise(0.1, 441000, 3);
-  const std::vector<float> again = noise_sound(noise_model(noise, kAnalysed_hz), noise.size(), 7);
+  const std::vector<float> again = noise_sound(noise_model(noise, kAnalysed_hz, kWhole), noise.size(), 7);
   EXPECT_NEAR(rms_db(again), -20.0, 0.1);
   // Power 0.01, evenly over half of the rate. Bands are wide enough for an error of their mean of 0.05 dB.
   const Spectrum spectrum = power_spectrum(again, kAnalysed_hz);
@@ -29,7 +31,7 @@ TEST(NoiseModel, WhiteNoiseKeepsItsDensity) {
 TEST(NoiseModel, LevelsAreDensitiesInTheirTime) {
   std::vector<float> noise = white_noise(0.1, 44100, 3);
   for (std::size_t i = 22050; i < noise.size(); ++i) noise[i] *= 0.1F;
-  const NoiseModel model = noise_model(noise, kAnalysed_hz);
+  const NoiseModel model = noise_model(noise, kAnalysed_hz, kWhole);
   const std::size_t points = model.points_hz.size(), step = 22050 / model.hop();
   const auto mean_db = [&](std::size_t first, std::size_t last) {
     double sum = 0;
@@ -46,7 +48,7 @@ TEST(NoiseModel, LevelsAreDensitiesInTheirTime) {
 }
 
 TEST(NoiseModel, PointsBeginABinApart) {
-  const std::vector<double> points = noise_points_hz(kAnalysed_hz, {.window = 256, .points = 32});
+  const std::vector<double> points = noise_points_hz(kAnalysed_hz, kWhole);
   ASSERT_EQ(points.size(), 32U);
   EXPECT_EQ(points.front(), 0.0);
   EXPECT_NEAR(points[1], kAnalysed_hz / 256, 1e-9);
@@ -55,14 +57,37 @@ TEST(NoiseModel, PointsBeginABinApart) {
   EXPECT_NEAR(points[30] / points[29], points[29] / points[28], 1e-6);
 }
 
+TEST(NoiseModel, LayersShareTheFrequencies) {
+  const std::vector<float> noise = white_noise(0.1, 220500, 3);
+  std::vector<float> sum(noise.size(), 0.0F);
+  for (const NoiseParams& layer : {NoiseParams{1024, 32, 0, 1200}, NoiseParams{256, 26, 1200, 0.5 * kAnalysed_hz}})
+    sum = added(sum, noise_sound(noise_model(noise, kAnalysed_hz, layer), noise.size(), 1));
+  EXPECT_NEAR(rms_db(sum), -20.0, 0.15);
+  const Spectrum spectrum = power_spectrum(sum, kAnalysed_hz);
+  for (const double hz : {400.0, 1000.0, 2000.0})
+    EXPECT_NEAR(band_db(spectrum, hz, hz + 400), 10.0 * std::log10(0.01 * 400 / (0.5 * kAnalysed_hz)), 0.4) << hz;
+}
+
+TEST(NoiseModel, WhatWasTakenAwayIsMadeUpFor) {
+  // A gap of 20 ms, as an impact leaves it. Frames of 46 ms that see part of it keep their level.
+  const NoiseParams low{.window = 1024, .points = 26, .from_hz = 0, .to_hz = 0.5 * kAnalysed_hz};
+  std::vector<float> noise = white_noise(0.1, 22050, 3), weight(noise.size(), 1.0F);
+  std::fill(weight.begin() + 11000, weight.begin() + 11441, 0.0F);
+  for (std::size_t i = 0; i < noise.size(); ++i) noise[i] *= weight[i];
+  const std::vector<float> again = noise_sound(noise_model(noise, kAnalysed_hz, low, weight), noise.size(), 1);
+  EXPECT_NEAR(rms_db(std::span(again).subspan(11000, 441)), -20.0, 1.0);
+  const std::vector<float> less = noise_sound(noise_model(noise, kAnalysed_hz, low), noise.size(), 1);
+  EXPECT_LT(rms_db(std::span(less).subspan(11000, 441)), -21.5);
+}
+
 TEST(NoiseModel, TheSeedDecides) {
-  const NoiseModel model = noise_model(white_noise(0.1, 5000, 3), kAnalysed_hz);
+  const NoiseModel model = noise_model(white_noise(0.1, 5000, 3), kAnalysed_hz, kWhole);
   EXPECT_EQ(noise_sound(model, 5000, 5), noise_sound(model, 5000, 5));
   EXPECT_NE(noise_sound(model, 5000, 5), noise_sound(model, 5000, 6));
 }
 
 TEST(NoiseModel, SilenceStaysSilent) {
-  const NoiseModel model = noise_model(std::vector<float>(1000, 0.0F), kAnalysed_hz);
+  const NoiseModel model = noise_model(std::vector<float>(1000, 0.0F), kAnalysed_hz, kWhole);
   EXPECT_LT(rms_db(noise_sound(model, 1000, 1)), -150);
 }
 

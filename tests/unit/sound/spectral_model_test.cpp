@@ -134,10 +134,14 @@ TEST(SpectralModelBytes, AModelReadIsTheModelWritten) {
       EXPECT_NEAR(a.level_db, std::clamp(b.level_db, -79.0, 6.0), 0.167);
     }
   }
-  EXPECT_EQ(read->noise.points_hz, written.noise.points_hz);
-  ASSERT_EQ(read->noise.levels_db.size(), written.noise.levels_db.size());
-  for (std::size_t i = 0; i < written.noise.levels_db.size(); ++i)
-    EXPECT_NEAR(read->noise.levels_db[i], written.noise.levels_db[i], 0.334);
+  ASSERT_EQ(read->noise.size(), written.noise.size());
+  for (std::size_t l = 0; l < written.noise.size(); ++l) {
+    EXPECT_EQ(read->noise[l].points_hz, written.noise[l].points_hz);
+    EXPECT_EQ(read->noise[l].frames, written.noise[l].frames);
+    ASSERT_EQ(read->noise[l].levels_db.size(), written.noise[l].levels_db.size());
+    for (std::size_t i = 0; i < written.noise[l].levels_db.size(); ++i)
+      EXPECT_NEAR(read->noise[l].levels_db[i], written.noise[l].levels_db[i], 0.334);
+  }
   ASSERT_EQ(read->transients.size(), 1U);
   EXPECT_EQ(read->transients[0].begin, written.transients[0].begin);
   for (std::size_t i = 0; i < read->transients[0].samples.size(); ++i)
@@ -150,7 +154,7 @@ TEST(SpectralModelBytes, ALongLineIsDivided) {
   SpectralModel model = analysed_workshop().model;
   model.samples = 1000 * 128;
   model.partials = {{{.frame = 3, .hz = 1000, .level_db = -20}, {.frame = 903, .hz = 1900, .level_db = -50}}};
-  model.noise = noise_model(std::vector<float>(model.samples, 0.0F), kAnalysed_hz);
+  model.noise.clear();
   const auto read = model_from_bytes(bytes_of(model), "long");
   ASSERT_TRUE(read) << read.error().message;
   const Partial partial = partial_of(read->partials[0]);
