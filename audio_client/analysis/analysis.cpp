@@ -78,14 +78,14 @@ std::optional<Difference> difference_of(const SoundAnalysis& a) {
 
 void add_packets(SoundAnalysis& a) {
   const sound::WaveletPackets packets = sound::wavelet_packets(a.samples, a.rate_hz);
-  for (int level = 1; level <= sound::kMostLevels; ++level)
+  for (int level = 1; level <= sound::kMostLevels; ++level) {
+    const std::vector<double> shares = sound::energy_shares(packets, level);
     for (int index = 0; index < 1 << level; ++index) {
-      const double share = sound::energy_share(packets, {level, index});
-      a.packets.push_back(
-          {{level, index},
-           share,
-           share > 0 ? std::max(sound::kSilence_db, a.level_db + sound::power_db(share)) : sound::kSilence_db});
+      const double share = shares[static_cast<std::size_t>(index)];
+      const double level_db = std::max(sound::kSilence_db, a.level_db + sound::power_db(share));
+      a.packets.push_back({{level, index}, share, level_db});
     }
+  }
   for (const sound::Packet& packet : sound::drilling_bands())
     a.bands.push_back({packet, sound::band_signal(packets, packet)});
 }

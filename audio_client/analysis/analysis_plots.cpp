@@ -17,6 +17,7 @@ using sound::DrillingState;
 
 constexpr int kWidth = 1100, kLeft = 64, kRight = 16, kPlotWidth = kWidth - kLeft - kRight;
 constexpr Colour kSignal{74, 111, 165}, kAccent{200, 85, 61}, kBone{176, 141, 87}, kQuiet{150, 150, 150};
+constexpr Colour kLineInk{120, 90, 40};
 
 // Okabe and Ito's colours, which people with impaired colour vision tell apart (Okabe 2008).
 constexpr std::array<Colour, sound::kDrillingStates> kStateColours = {
@@ -100,9 +101,10 @@ NamedPicture density(const SoundAnalysis& a) {
   draw_density(plot, a.whole, kQuiet, "whole", line++);
   for (const StateSpectrum& of : a.spectra)
     draw_density(plot, of.spectrum, colour_of(of.state), sound::name(of.state), line++);
-  int below = 346;
+  // Below 900 Hz the names would lie on each other.
+  int named = 0;
   for (const FoundLine& found : a.lines)
-    if (found.line.hz > 900) plot.note(found.line.hz, below -= 11, found.line.name, kBone);
+    if (found.line.hz > 900) plot.note(found.line.hz, 4 + 11 * (named++ % 8), found.line.name, kLineInk);
   return {"psd.png", std::move(page)};
 }
 

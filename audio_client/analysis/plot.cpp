@@ -35,7 +35,7 @@ std::string tick_text(double value, double step) {
 Plot::Plot(picture::Picture& picture, const Frame& frame, const Axis& horizontal, const Axis& vertical)
     : picture_(picture), frame_(frame), horizontal_(horizontal), vertical_(vertical) {
   const int bottom = frame.y + frame.height;
-  const double step_x = tick_step(horizontal, frame.width / 90), step_y = tick_step(vertical, frame.height / 28);
+  const double step_x = tick_step(horizontal, frame.width / 90), step_y = tick_step(vertical, frame.height / 18);
   for (double x = std::ceil(horizontal.low / step_x) * step_x; x <= horizontal.high + 1e-9 * step_x; x += step_x) {
     const int at = static_cast<int>(std::lround(column(x)));
     picture.fill(at, frame.y, 1, frame.height, kGrid);

@@ -6,7 +6,6 @@
 #include <complex>
 #include <limits>
 #include <numbers>
-#include <utility>
 
 #include "common/core/check.hpp"
 #include "common/sound/gearbox.hpp"
@@ -19,9 +18,9 @@ namespace {
 // Bands in which levels are compared, Hz. Perforation is heard below 400 Hz, and layers up to 7 kHz (8.5.4).
 constexpr std::array<double, 5> kEdges_hz = {50, 400, 2756, 5512, 8000};
 constexpr std::size_t kBands = kEdges_hz.size() - 1;
-constexpr double kFloor_db = -95.0;          // about the rounding of 16 bits; digital silence is not infinitely quiet
-constexpr double kSteadiest_db = 0.5;        // pure tones have no noise, and would be divided at every flutter
-constexpr double kSustained_s = 0.4;         // a part that is long enough to be a reference
+constexpr double kFloor_db = -95.0;    // about the rounding of 16 bits; digital silence is not infinitely quiet
+constexpr double kSteadiest_db = 0.5;  // pure tones have no noise, and would be divided at every flutter
+constexpr double kSustainedLow_s = 0.2, kSustainedHigh_s = 0.4;  // a part that is long enough to be a reference
 constexpr double kShortestSpan_s = 0.05;     // shorter ones belong to a neighbour, except perforation
 constexpr std::size_t kShortestPart = 3;     // frames
 constexpr double kPenaltyForEachBand = 3.0;  // times log(frames): overlapping frames count about twice
@@ -109,24 +108,30 @@ Part part_of(const Levels& levels, std::size_t first, std::size_t last) {
   return part;
 }
 
-// The loudest and the quietest level of parts that last. If none lasts, of all that `counts` accepts.
+struct LevelRange {
+  double low_db = 0, high_db = 0;
+};
+
+// The quietest and the loudest level of parts that last. A free drill may be heard for a moment only, but a burst is no
+// reference of loudness. If no part lasts, of all that `counts` accepts.
 template <class Counts>
-std::optional<std::pair<double, double>> level_range(const std::vector<Part>& parts, const Counts& counts) {
-  for (const double shortest_s : {kSustained_s, 0.0}) {
-    double low = std::numeric_limits<double>::infinity(), high = -low;
-    for (const Part& part : parts) {
-      if (part.seconds < shortest_s || !counts(part)) continue;
-      low = std::min(low, part.level_db);
-      high = std::max(high, part.level_db);
-    }
-    if (low <= high) return std::pair{low, high};
-  }
-  return std::nullopt;
+std::optional<LevelRange> level_range(const std::vector<Part>& parts, const Counts& counts) {
+  const auto extreme = [&](double shortest_s, double sign) {
+    double best = -std::numeric_limits<double>::infinity();
+    for (const Part& part : parts)
+      if (part.seconds >= shortest_s && counts(part)) best = std::max(best, sign * part.level_db);
+    return sign * best;
+  };
+  LevelRange range{extreme(kSustainedLow_s, -1.0), extreme(kSustainedHigh_s, 1.0)};
+  if (!std::isfinite(range.low_db)) range.low_db = extreme(0.0, -1.0);
+  if (!std::isfinite(range.high_db)) range.high_db = extreme(0.0, 1.0);
+  if (!std::isfinite(range.low_db)) return std::nullopt;
+  return range;
 }
 
 void find_rest(std::vector<Part>& parts, const StateParams& params) {
   const auto range = level_range(parts, [](const Part&) { return true; });
-  const double below_db = std::max(params.silence_db, range->second - params.off_db);
+  const double below_db = std::max(params.silence_db, range->high_db - params.off_db);
   bool ran = false;
   for (Part& part : parts) {
     if (part.level_db >= below_db) ran = true;
@@ -137,7 +142,7 @@ void find_rest(std::vector<Part>& parts, const StateParams& params) {
 void find_bone(std::vector<Part>& parts, const StateParams& params, std::optional<double> free_db) {
   const auto range = level_range(parts, [](const Part& part) { return !part.rests(); });
   if (!range) return;
-  const double from_db = free_db.value_or(range->first), span_db = range->second - from_db;
+  const double from_db = free_db.value_or(range->low_db), span_db = range->high_db - from_db;
   if (span_db < params.distinct_db) return;
   bool several = false;
   double motor = 0, mesh = 0;
@@ -147,7 +152,7 @@ void find_bone(std::vector<Part>& parts, const StateParams& params, std::optiona
     if (way < params.free_below) continue;
     part.state = way < params.cortical_from ? DrillingState::cancellous : DrillingState::cortical;
     motor += part.motor_power, mesh += part.mesh_power;
-    several = several || (part.state == DrillingState::cancellous && part.seconds >= kSustained_s);
+    several = several || (part.state == DrillingState::cancellous && part.seconds >= kSustainedHigh_s);
   }
   // One kind of bone alone is the loudest, whatever it is. The first peak of cortical bone is the motor's, and that of
   // cancellous bone is the gear's (8.5.4).
@@ -156,17 +161,22 @@ void find_bone(std::vector<Part>& parts, const StateParams& params, std::optiona
     if (part.state == DrillingState::cortical) part.state = DrillingState::cancellous;
 }
 
-// A short burst at low frequencies after bone, before a free or resting drill. It may be several parts.
+// A short burst at low frequencies after bone, before a free or resting drill. It may be several parts. Shorter parts
+// beside it are transitions, whose frames are half in the burst.
 void find_perforation(std::vector<Part>& parts, const StateParams& params) {
+  const auto is_transition = [&](std::size_t i) { return parts[i].seconds < kShortestSpan_s; };
   for (std::size_t i = 1; i < parts.size(); ++i) {
-    const Part& bone = parts[i - 1];
-    if (!bone.cuts() || bone.seconds < kShortestSpan_s) continue;
+    std::size_t begin = i;
+    while (begin > 0 && is_transition(begin - 1)) --begin;
+    if (begin == 0 || !parts[begin - 1].cuts()) continue;
+    const double burst_db = parts[begin - 1].low_db + params.burst_db;
     double seconds = 0;
     std::size_t end = i;
-    while (end < parts.size() && parts[end].low_db >= bone.low_db + params.burst_db && !parts[end].rests())
-      seconds += parts[end++].seconds;
-    const bool leaves = end < parts.size() && !parts[end].cuts();
-    if (end == i || seconds > params.longest_burst_s || !leaves) continue;
+    while (end < parts.size() && parts[end].low_db >= burst_db && !parts[end].rests()) seconds += parts[end++].seconds;
+    if (end == i || seconds > params.longest_burst_s) continue;
+    std::size_t next = end;
+    while (next < parts.size() && is_transition(next)) ++next;
+    if (next == parts.size() || parts[next].cuts()) continue;
     for (; i < end; ++i) parts[i].state = DrillingState::perforation;
   }
 }

@@ -30,7 +30,7 @@ struct TimeSpan {
 
 struct StateParams {
   double frame_s = 0.01;         // from one level to the next; longer in recordings of more than kMostFrames of them
-  double off_db = 20;            // a drill that rests is that much below the loudest part [A]
+  double off_db = 25;            // a drill that rests is that much below the loudest part [A]
   double silence_db = -75;       // re full scale: below it nothing runs [A]
   double distinct_db = 3;        // if running parts differ by less, they are all free [A]
   double free_below = 0.2;       // of the way from free to loudest, in dB: below it, free [A]

@@ -42,7 +42,8 @@ struct GearLine {
   double hz = 0;
 };
 
-// The three shafts, both gear meshes with the spin of their planets, and the first three harmonics of the commutation.
+// The three shafts, both gear meshes with the spin of their planets, and harmonics: of the output mesh, which are heard
+// up to the fourth (8.5.4), and of the commutation, of which the third is the loudest.
 // `spindle_rpm`: speed of the output shaft, revolutions a minute, above 0.
 [[nodiscard]] std::vector<GearLine> gear_table(const Gearbox& gears, double spindle_rpm);
 

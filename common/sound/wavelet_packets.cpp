@@ -108,16 +108,18 @@ std::vector<float> band_signal(const WaveletPackets& packets, const Packet& pack
   return signal;
 }
 
-double energy_share(const WaveletPackets& packets, const Packet& packet) {
-  const auto energy_of = [](const std::vector<float>& coefficients) {
-    double sum = 0;
-    for (const float x : coefficients) sum += static_cast<double>(x) * x;
-    return sum;
-  };
+std::vector<double> energy_shares(const WaveletPackets& packets, int level) {
+  std::vector<double> shares;
   double all = 0;
-  for (const std::vector<float>& band : packets.levels[static_cast<std::size_t>(packet.level) - 1])
-    all += energy_of(band);
-  return all > 0 ? energy_of(packets.at(packet)) / all : 0.0;
+  for (const std::vector<float>& band : packets.levels[static_cast<std::size_t>(level) - 1]) {
+    double sum = 0;
+    for (const float x : band) sum += static_cast<double>(x) * x;
+    shares.push_back(sum);
+    all += sum;
+  }
+  if (all > 0)
+    for (double& share : shares) share /= all;
+  return shares;
 }
 
 std::vector<Packet> drilling_bands() {

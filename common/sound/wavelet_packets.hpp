@@ -48,8 +48,8 @@ struct WaveletPackets {
 // division of the frequencies into bands of the decomposition, sum to the signal.
 [[nodiscard]] std::vector<float> band_signal(const WaveletPackets& packets, const Packet& packet);
 
-// Part of the energy of a level that is in the band, 0 to 1; 0 for silence.
-[[nodiscard]] double energy_share(const WaveletPackets& packets, const Packet& packet);
+// Part of the energy of a level that is in each of its 2^level bands. They sum to 1, or are all 0 for silence.
+[[nodiscard]] std::vector<double> energy_shares(const WaveletPackets& packets, int level);
 
 // The bands of Figure 8.14: level 4 for the lower half of the frequencies, level 3 for the upper one.
 [[nodiscard]] std::vector<Packet> drilling_bands();

@@ -6,9 +6,9 @@
 #include <sys/stat.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <cstdio>
+#include <ctime>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <set>
@@ -114,20 +114,22 @@ TEST(SoundAnalysis, RealRecordings) {
   // A geared drill at constant speed.
   EXPECT_EQ(steady.states.size(), 1U) << states_in_words(steady);
   EXPECT_EQ(steady.states.front().state, DrillingState::free);
-  const auto mesh = std::ranges::find(steady.lines, std::string_view("output mesh"),
-                                      [](const FoundLine& of) { return of.line.name; });
-  EXPECT_NEAR(mesh->line.hz, 1140, 1);
+  const auto twice_mesh = std::ranges::find(steady.lines, std::string_view("output mesh x2"),
+                                            [](const FoundLine& of) { return of.line.name; });
+  // Its loudest line, near 2280 Hz.
+  ASSERT_TRUE(twice_mesh->peak);
+  EXPECT_NEAR(twice_mesh->peak->hz, 2280, 5);
 
   const auto saw = sound::read_wav(*shared / "data/sound/opensfx_40_circular_saw.wav");
   ASSERT_TRUE(saw) << saw.error().message;
   const SoundAnalysis cut = analyse(*saw, {});
   SCOPED_TRACE(states_in_words(cut));
-  // It cuts from 0.5 to 3.3 s. It is another tool, so only cutting and not cutting are asked for.
-  for (const double s : {1.0, 1.5, 2.0, 2.5, 3.0}) {
-    const DrillingState state = state_at(cut, s);
-    EXPECT_TRUE(state == DrillingState::cortical || state == DrillingState::cancellous) << s;
-  }
-  EXPECT_FALSE(state_at(cut, 3.85) == DrillingState::cortical);
+  // It runs up, cuts from 0.5 to 3.3 s, and runs down. It is another tool, so the kind of bone says nothing.
+  const auto cutting =
+      std::ranges::max_element(cut.states, {}, [](const sound::StateSpan& span) { return span.to_s - span.from_s; });
+  EXPECT_TRUE(cutting->state == DrillingState::cortical || cutting->state == DrillingState::cancellous);
+  EXPECT_NEAR(cutting->from_s, 0.5, 0.05);
+  EXPECT_NEAR(cutting->to_s, 3.3, 0.15);
 }
 
 TEST(SoundAnalysis, LongRecordingsAreAnalysedInBoundedTime) {
@@ -138,12 +140,12 @@ TEST(SoundAnalysis, LongRecordingsAreAnalysedInBoundedTime) {
     random = random * 1664525U + 1013904223U;
     recording.samples.push_back(1e-10F * static_cast<float>(random >> 1U) - 0.1F);
   }
-  const auto begin = std::chrono::steady_clock::now();
+  const std::clock_t begin = std::clock();
   const SoundAnalysis analysis = analyse(recording, {});
-  const std::chrono::duration<double> work = std::chrono::steady_clock::now() - begin;
-  std::printf("analysed 30 s in %.2f s: %.0f times as fast as it sounds\n", work.count(), 30 / work.count());
-  // Twenty times is the goal on a free core; a busy machine with a sanitizer gets a tenth of that.
-  EXPECT_GT(30 / work.count(), 2);
+  const double work_s = static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC;
+  std::printf("analysed 30 s in %.2f s of a processor: %.0f times as fast as it sounds\n", work_s, 30 / work_s);
+  // Twenty times is the goal, which deploy/figures measures. A sanitizer takes most of it.
+  EXPECT_GT(30 / work_s, 2);
   EXPECT_LE(analysis.spectrogram.columns, 2000U);
 }
 

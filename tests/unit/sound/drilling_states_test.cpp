@@ -116,12 +116,12 @@ TEST(DrillingStates, TheUserMaySayWhereTheDrillRunsFree) {
   // Begins in bone: the quietest part would count as free. The user knows better.
   const std::vector<Scene> scenes = {{DrillingState::cortical, 1.5, -29, -21, -24},
                                      {DrillingState::cancellous, 1.5, -33, -31, -27},
-                                     {DrillingState::free, 0.3, -38, -32, -35}};
+                                     {DrillingState::free, 0.15, -38, -32, -35}};
   const auto samples = played(scenes, 21);
   const auto guessed = drilling_states(samples, kAnalysed_hz);
   ASSERT_GE(guessed.size(), 2U);
   EXPECT_EQ(guessed[1].state, DrillingState::free) << words(guessed);
-  const auto told = drilling_states(samples, kAnalysed_hz, {.free = TimeSpan{3.05, 3.25}});
+  const auto told = drilling_states(samples, kAnalysed_hz, {.free = TimeSpan{3.02, 3.13}});
   SCOPED_TRACE(words(told));
   expect_states(told, scenes);
 }
