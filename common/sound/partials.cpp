@@ -4,6 +4,8 @@
 #include <cmath>
 #include <map>
 #include <numbers>
+#include <optional>
+#include <tuple>
 
 #include "common/core/check.hpp"
 #include "common/sound/oscillator.hpp"
@@ -19,6 +21,14 @@ struct Pair {
   double apart_hz = 0;
   std::size_t partial = 0, peak = 0;
 };
+
+// The last cut after sample `from`, up to `to`.
+std::optional<std::size_t> cut_between(std::size_t from, std::size_t to, std::span<const std::size_t> cuts) {
+  std::optional<std::size_t> last;
+  for (const std::size_t cut : cuts)
+    if (cut > from && cut <= to) last = std::max(last.value_or(0), cut);
+  return last;
+}
 
 }  // namespace
 
@@ -47,13 +57,15 @@ std::vector<std::vector<Sinusoid>> frame_peaks(std::span<const float> samples, d
 }
 
 std::vector<Partial> continued(std::span<const std::vector<Sinusoid>> frames, double rate_hz,
-                               const PartialParams& params) {
+                               const PartialParams& params, std::span<const std::size_t> cuts) {
   std::vector<Partial> all;
+  const auto hop = static_cast<std::size_t>(params.hop);
   std::vector<std::size_t> living;  // those with a point in the frame before
   std::vector<Pair> pairs;
   for (std::size_t m = 0; m < frames.size(); ++m) {
     const std::vector<Sinusoid>& peaks = frames[m];
     pairs.clear();
+    if (m > 0 && cut_between((m - 1) * hop, m * hop, cuts)) living.clear();
     for (const std::size_t partial : living) {
       const double hz = all[partial].points.back().hz, reach_hz = params.step_hz + params.step_part * hz;
       auto peak = std::ranges::lower_bound(peaks, hz - reach_hz, {}, &Sinusoid::hz);
@@ -84,7 +96,8 @@ std::vector<Partial> continued(std::span<const std::vector<Sinusoid>> frames, do
   return all;
 }
 
-std::vector<float> sound_with_phases(std::span<const Partial> partials, double rate_hz, int hop, std::size_t samples) {
+std::vector<float> sound_with_phases(std::span<const Partial> partials, double rate_hz, int hop, std::size_t samples,
+                                     std::span<const std::size_t> cuts) {
   std::vector<float> sound(samples, 0.0F);
   for (const Partial& partial : partials) {
     if (partial.points.empty()) continue;
@@ -96,7 +109,15 @@ std::vector<float> sound_with_phases(std::span<const Partial> partials, double r
     birth.phase -= 2.0 * pi * birth.hz * hop_s;
     death.phase += 2.0 * pi * death.hz * hop_s;
     const auto begin = static_cast<std::ptrdiff_t>(partial.first) * hop;
-    add_cubic(sound, begin - hop, hop, birth, points.front(), rate_hz);
+    const std::size_t first = partial.first * static_cast<std::size_t>(hop);
+    const auto cut = first > 0 ? cut_between(first - static_cast<std::size_t>(hop), first, cuts) : std::nullopt;
+    if (!cut) add_cubic(sound, begin - hop, hop, birth, points.front(), rate_hz);
+    if (cut && *cut < first) {
+      const int count = static_cast<int>(first - *cut);
+      birth = points.front();
+      birth.phase -= 2.0 * pi * birth.hz * count / rate_hz;
+      add_cubic(sound, begin - count, count, birth, points.front(), rate_hz);
+    }
     for (std::size_t i = 0; i + 1 < points.size(); ++i)
       add_cubic(sound, begin + static_cast<std::ptrdiff_t>(i) * hop, hop, points[i], points[i + 1], rate_hz);
     add_cubic(sound, begin + (static_cast<std::ptrdiff_t>(points.size()) - 1) * hop, hop, points.back(), death,

@@ -33,14 +33,15 @@ struct Partial {
 
 // Peak continuation: from frame to frame, the closest pair of a partial and a peak is joined first, then the next
 // closest, within the step. A partial without a peak dies, and a peak without a partial is born. Short partials are
-// left out. Partials are in the order of their births, then of their frequencies.
+// left out. Partials are in the order of their births, then of their frequencies. None goes on across a cut.
 [[nodiscard]] std::vector<Partial> continued(std::span<const std::vector<Sinusoid>> frames, double rate_hz,
-                                             const PartialParams& params);
+                                             const PartialParams& params, std::span<const std::size_t> cuts = {});
 
 // The sound of partials, with their phases: between two points the amplitude is a line, and the phase the cubic that
 // meets both phases and frequencies, with the number of turns that makes it smoothest (McAulay 1986, eq. 33 to 37). A
-// partial begins and ends within a hop of its first and last point.
+// partial begins and ends within a hop of its first and last point, or at once at a cut in the hop before its first
+// one.
 [[nodiscard]] std::vector<float> sound_with_phases(std::span<const Partial> partials, double rate_hz, int hop,
-                                                   std::size_t samples);
+                                                   std::size_t samples, std::span<const std::size_t> cuts = {});
 
 }  // namespace osteon::sound

@@ -42,8 +42,9 @@ SpectralAnalysis spectral_analysis(std::span<const float> samples, double rate_h
   OSTEON_CHECK(rate_hz > 0);
   SpectralAnalysis a;
   a.impacts = impacts(samples, rate_hz, params.transients);
-  a.partials = continued(frame_peaks(samples, rate_hz, params.partials, a.impacts), rate_hz, params.partials);
-  a.sines = sound_with_phases(a.partials, rate_hz, params.partials.hop, samples.size());
+  a.partials =
+      continued(frame_peaks(samples, rate_hz, params.partials, a.impacts), rate_hz, params.partials, a.impacts);
+  a.sines = sound_with_phases(a.partials, rate_hz, params.partials.hop, samples.size(), a.impacts);
   a.residual.assign(samples.begin(), samples.end());
   for (std::size_t i = 0; i < samples.size(); ++i) a.residual[i] -= a.sines[i];
   a.model = {.rate_hz = rate_hz,

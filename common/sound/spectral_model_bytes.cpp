@@ -22,6 +22,7 @@ constexpr double kFull = 32767.0;
 // Partials at a time, on average: a small file must not cost hours of oscillators.
 constexpr std::uint64_t kMostPartials = 1000;
 constexpr std::uint64_t kMostLayers = 8;
+constexpr std::uint64_t kMostFrames = 65535;
 
 class Writer {
  public:
@@ -78,7 +79,7 @@ void put_knot(Writer& out, std::size_t hops, const Knot& knot, double rate_hz) {
   out.put(rounded((kLoudest_db - knot.level_db) * kStepsPerLevel_db, 255), 1);
 }
 
-void put_partial(Writer& out, const std::vector<Knot>& knots, double rate_hz) {
+void put_partial(Writer& out, const std::vector<Knot>& knots, std::size_t after, double rate_hz) {
   // Lines of more than 255 hops are divided.
   std::vector<Knot> all;
   const Partial points = partial_of(knots);
@@ -90,8 +91,9 @@ void put_partial(Writer& out, const std::vector<Knot>& knots, double rate_hz) {
     }
     all.push_back(knot);
   }
-  out.put(all.front().frame, 4);
-  out.put(all.size(), 4);
+  OSTEON_CHECK(all.front().frame >= after);
+  out.put(all.front().frame - after, 2);
+  out.put(all.size(), 2);
   for (std::size_t i = 0; i < all.size(); ++i)
     put_knot(out, i > 0 ? all[i].frame - all[i - 1].frame : 0, all[i], rate_hz);
 }
@@ -109,8 +111,8 @@ Result<void> get_partials(Reader& in, SpectralModel& model, const std::string& f
   const std::uint64_t count = in.get(4);
   std::uint64_t points = 0;
   for (std::uint64_t p = 0; p < count && in.whole(); ++p) {
-    std::uint64_t frame = in.get(4);
-    const std::uint64_t knots = in.get(4);
+    std::uint64_t frame = (model.partials.empty() ? 0 : model.partials.back().front().frame) + in.get(2);
+    const std::uint64_t knots = in.get(2);
     if (in.whole() && (knots == 0 || knots > in.left() / 4))
       return damaged(file, outside("the number of knots of partial " + std::to_string(p), knots,
                                    "1 to the " + std::to_string(in.left() / 4) + " that the file has left"));
@@ -212,6 +214,8 @@ Result<SpectralModel> model_of(Reader in, const std::string& file) {
   if (static_cast<double>(samples) > kLongest_s * static_cast<double>(rate))
     return damaged(file, outside("its number of samples", samples, "at most 300 s"));
   if (hop < 16 || hop > 8192) return damaged(file, outside("its hop", hop, "16 to 8192 samples"));
+  if (samples / hop >= kMostFrames)
+    return damaged(file, outside("its number of frames", samples / hop + 1, "at most " + std::to_string(kMostFrames)));
   model.rate_hz = static_cast<double>(rate), model.samples = samples, model.hop = static_cast<int>(hop);
   if (auto got = get_partials(in, model, file); !got) return tl::unexpected(got.error());
   if (auto got = get_noise(in, model, file); !got) return tl::unexpected(got.error());
@@ -225,6 +229,7 @@ Result<SpectralModel> model_of(Reader in, const std::string& file) {
 
 std::string bytes_of(const SpectralModel& model) {
   OSTEON_CHECK(model.rate_hz == std::round(model.rate_hz) && model.samples <= UINT32_MAX && model.hop <= UINT16_MAX);
+  OSTEON_CHECK(model.samples / static_cast<std::size_t>(model.hop) < kMostFrames);
   Writer out;
   out.put(kModelMagic);
   out.put(kModelVersion, 2);
@@ -232,7 +237,11 @@ std::string bytes_of(const SpectralModel& model) {
   out.put(model.samples, 4);
   out.put(static_cast<std::uint64_t>(model.hop), 2);
   out.put(model.partials.size(), 4);
-  for (const std::vector<Knot>& knots : model.partials) put_partial(out, knots, model.rate_hz);
+  std::size_t after = 0;  // frame at which the partial before begins
+  for (const std::vector<Knot>& knots : model.partials) {
+    put_partial(out, knots, after, model.rate_hz);
+    after = knots.front().frame;
+  }
   out.put(model.noise.size(), 1);
   for (const NoiseModel& noise : model.noise) {
     out.put(static_cast<std::uint64_t>(noise.params.window), 2);

@@ -15,7 +15,8 @@ inline constexpr int kModelVersion = 1;
 inline constexpr std::uintmax_t kLargestModel_bytes = 64U << 20U;
 
 // Numbers are rounded: levels of partials to 1/3 dB, of noise to 2/3 dB, frequencies to the 65535th of half the rate,
-// and stored samples to 16 bits. The rate is a whole number of Hz, 22050 to 48000.
+// and stored samples to 16 bits. The rate is a whole number of Hz, 22050 to 48000, and the frames of the partials,
+// which are in the order of their births, are at most 65535.
 [[nodiscard]] std::string bytes_of(const SpectralModel& model);
 
 // `file`: for the messages. Errors: invalid_input (damaged), unsupported (another version); one sentence with file,

@@ -196,8 +196,8 @@ TEST(SpectralModelBytes, DamageIsRefusedByASentence) {
       {with(12, 0xff), "its rate is"},
       {with(17, 0xff), "number of samples"},
       {with(18, 0), "its hop is 0"},
-      {with(27, 0xff), "frame of knot 0 of partial 0"},
-      {with(31, 0xff), "number of knots of partial 0"},
+      {with(25, 0xff), "frame of knot 0 of partial 0"},
+      {with(27, 0xff), "number of knots of partial 0"},
       {sealed(whole + "more"), "bytes follow its end"},
   };
   for (const Wrong& wrong : cases) {
