@@ -16,9 +16,9 @@ struct Knot {
 };
 
 struct SegmentTolerance {
-  double level_db = 0.5;
-  double hz = 1.0;
-  double part = 0.001;  // of the frequency; the larger of both counts
+  double level_db = 1.5;
+  double hz = 3.0;
+  double part = 0.002;  // of the frequency; the larger of both counts
 };
 
 // Knots such that no point of the partial is farther from the lines than the tolerance (Ramer 1972). The first and the

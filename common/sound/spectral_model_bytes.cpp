@@ -22,7 +22,7 @@ constexpr double kFull = 32767.0;
 // Partials at a time, on average: a small file must not cost hours of oscillators.
 constexpr std::uint64_t kMostPartials = 1000;
 constexpr std::uint64_t kMostLayers = 8;
-constexpr std::uint64_t kMostFrames = 65535;
+constexpr std::uint64_t kMostModelFrames = 65535;
 
 class Writer {
  public:
@@ -214,8 +214,9 @@ Result<SpectralModel> model_of(Reader in, const std::string& file) {
   if (static_cast<double>(samples) > kLongest_s * static_cast<double>(rate))
     return damaged(file, outside("its number of samples", samples, "at most 300 s"));
   if (hop < 16 || hop > 8192) return damaged(file, outside("its hop", hop, "16 to 8192 samples"));
-  if (samples / hop >= kMostFrames)
-    return damaged(file, outside("its number of frames", samples / hop + 1, "at most " + std::to_string(kMostFrames)));
+  if (samples / hop >= kMostModelFrames)
+    return damaged(file,
+                   outside("its number of frames", samples / hop + 1, "at most " + std::to_string(kMostModelFrames)));
   model.rate_hz = static_cast<double>(rate), model.samples = samples, model.hop = static_cast<int>(hop);
   if (auto got = get_partials(in, model, file); !got) return tl::unexpected(got.error());
   if (auto got = get_noise(in, model, file); !got) return tl::unexpected(got.error());
@@ -229,7 +230,7 @@ Result<SpectralModel> model_of(Reader in, const std::string& file) {
 
 std::string bytes_of(const SpectralModel& model) {
   OSTEON_CHECK(model.rate_hz == std::round(model.rate_hz) && model.samples <= UINT32_MAX && model.hop <= UINT16_MAX);
-  OSTEON_CHECK(model.samples / static_cast<std::size_t>(model.hop) < kMostFrames);
+  OSTEON_CHECK(model.samples / static_cast<std::size_t>(model.hop) < kMostModelFrames);
   Writer out;
   out.put(kModelMagic);
   out.put(kModelVersion, 2);

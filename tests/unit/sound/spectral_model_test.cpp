@@ -57,6 +57,23 @@ TEST(SpectralModel, TheSoundOfTheModelHasTheLevelsOfTheSound) {
   EXPECT_LT(envelope_error_db(samples, sound, kAnalysed_hz), 0.5);
 }
 
+TEST(SpectralModel, TonesAreRecoveredFromTheFile) {
+  const std::vector<float> samples =
+      added(tone(2280.3, 0.2, 44100, kAnalysed_hz), tone(3419.6, 0.05, 44100, kAnalysed_hz));
+  const auto model = model_from_bytes(bytes_of(spectral_analysis(samples, kAnalysed_hz).model), "tones");
+  ASSERT_TRUE(model) << model.error().message;
+  for (const auto& [hz, amplitude] : {std::pair{2280.3, 0.2}, std::pair{3419.6, 0.05}}) {
+    const auto found = std::ranges::find_if(
+        model->partials, [&](const std::vector<Knot>& knots) { return std::abs(knots.front().hz - hz) < 0.5; });
+    ASSERT_NE(found, model->partials.end()) << hz;
+    EXPECT_EQ(found->back().frame, 44100U / 128);
+    for (const Knot& knot : *found) {
+      EXPECT_NEAR(knot.hz, hz, 0.5);
+      EXPECT_NEAR(knot.level_db, 20.0 * std::log10(amplitude), 0.2);
+    }
+  }
+}
+
 TEST(SpectralModel, ToneAndNoiseGoToTheirParts) {
   const std::vector<float> noise = white_noise(0.01, 44100, 2), line = tone(1140, 0.1, 44100, kAnalysed_hz);
   SpectralParams params;
