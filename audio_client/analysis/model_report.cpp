@@ -47,7 +47,7 @@ ModelReport model_report(const sound::WavSound& recording, int refinements, std:
   OSTEON_CHECK(kept.has_value());
   report.sound = sound::resynthesised(*kept, seed);
   std::vector<float> with_phases = sound::resynthesised_noise(*kept, seed);
-  for (std::size_t i = 0; i < original.size(); ++i) with_phases[i] += report.analysis.sines[i];
+  for (std::size_t i = 0; i < original.size(); ++i) with_phases[i] += report.analysis.kept_sines[i];
   sound::put_transients(with_phases, kept->transients, kAnalysisRate_hz);
   report.rows = {likeness("sines, with phases", original, report.analysis.sines),
                  likeness("all, with phases", original, with_phases),
@@ -62,7 +62,8 @@ std::string to_text(const ModelReport& report) {
   for (const auto& partial : model.partials) knots += partial.size();
   for (const sound::Transient& transient : model.transients) stored += transient.samples.size();
   std::string text = line("recording  %.2f s, modelled at %d Hz\n", seconds, kAnalysisRate_hz);
-  text += line("partials   %zu of %zu knots\n", model.partials.size(), knots);
+  text += line("partials   %zu, and %zu of them in the model by %zu knots\n", report.analysis.partials.size(),
+               model.partials.size(), knots);
   for (const sound::NoiseModel& noise : model.noise)
     text += line("noise      %zu frames of %zu levels, %.0f to %.0f Hz\n", noise.frames, noise.points_hz.size(),
                  noise.params.from_hz, noise.params.to_hz);

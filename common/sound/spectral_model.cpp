@@ -1,5 +1,7 @@
 #include "common/sound/spectral_model.hpp"
 
+#include <utility>
+
 #include "common/core/check.hpp"
 #include "common/sound/oscillator.hpp"
 #include "common/sound/random.hpp"
@@ -22,9 +24,10 @@ void add_partial(std::span<float> sound, const Partial& partial, int hop, double
   add_linear(sound, at, hop, from, death, turns, rate_hz);
 }
 
-// The residual without what the impacts' samples have of it.
-std::vector<NoiseModel> noise_layers(const SpectralAnalysis& a, double rate_hz, const SpectralParams& params) {
-  std::vector<float> weight(a.residual.size(), 1.0F), rest = a.residual;
+// Of what the model's partials and the samples of its impacts leave.
+std::vector<NoiseModel> noise_layers(std::vector<float> rest, const SpectralAnalysis& a, double rate_hz,
+                                     const SpectralParams& params) {
+  std::vector<float> weight(rest.size(), 1.0F);
   for (const Transient& transient : a.model.transients) {
     const std::vector<float> flanks = transient_weight(transient.samples.size(), rate_hz);
     for (std::size_t i = 0; i < flanks.size(); ++i) weight[transient.begin + i] *= 1.0F - flanks[i];
@@ -53,8 +56,23 @@ SpectralAnalysis spectral_analysis(std::span<const float> samples, double rate_h
              .partials = {},
              .noise = {},
              .transients = transients_at(samples, rate_hz, a.impacts, params.transients)};
-  for (const Partial& partial : a.partials) a.model.partials.push_back(knots_of(partial, params.tolerance));
-  a.model.noise = noise_layers(a, rate_hz, params);
+  std::vector<Partial> others;
+  for (const Partial& partial : a.partials) {
+    const double seconds = static_cast<double>(partial.points.size()) * params.partials.hop / rate_hz;
+    if (seconds < params.kept_s)
+      others.push_back(partial);
+    else
+      a.model.partials.push_back(knots_of(partial, params.tolerance));
+  }
+  const std::vector<float> short_sines =
+      sound_with_phases(others, rate_hz, params.partials.hop, samples.size(), a.impacts);
+  a.kept_sines = a.sines;
+  std::vector<float> rest = a.residual;
+  for (std::size_t i = 0; i < rest.size(); ++i) {
+    a.kept_sines[i] -= short_sines[i];
+    rest[i] += short_sines[i];
+  }
+  a.model.noise = noise_layers(std::move(rest), a, rate_hz, params);
   return a;
 }
 

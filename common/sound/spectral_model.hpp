@@ -14,6 +14,8 @@ namespace osteon::sound {
 
 struct SpectralParams {
   PartialParams partials;
+  // Shorter partials sound like noise, and are kept as that: they would be half of the model.
+  double kept_s = 0.06;
   SegmentTolerance tolerance;
   // Low tones are closer than short frames can tell, and blows shorter than long frames can tell.
   double noise_split_hz = 1200;
@@ -38,6 +40,7 @@ struct SpectralAnalysis {
   std::vector<Partial> partials;     // with the phases of the frames
   std::vector<float> sines;          // the partials' sound with these phases
   std::vector<float> residual;       // in time
+  std::vector<float> kept_sines;     // of the partials that the model keeps; its noise has the rest
   SpectralModel model;
 };
 

@@ -168,7 +168,7 @@ std::vector<Sinusoid> at(std::initializer_list<double> hz) {
 TEST(Continuation, TheClosestPairComesFirst) {
   // 1012 is nearest to 1010, which takes it. So 1000 takes 990, and 2000, which has nothing within 30 Hz, dies.
   const std::vector<std::vector<Sinusoid>> frames{at({1000, 1010, 2000}), at({990, 1012, 2040})};
-  const std::vector<Partial> partials = continued(frames, kAnalysed_hz, {.shortest_s = 0});
+  const std::vector<Partial> partials = continued(frames, kAnalysed_hz, {.peaks = {}, .shortest_s = 0});
   ASSERT_EQ(partials.size(), 4U);
   EXPECT_EQ(partials[0].points.back().hz, 990);
   EXPECT_EQ(partials[1].points.back().hz, 1012);
@@ -179,7 +179,7 @@ TEST(Continuation, TheClosestPairComesFirst) {
 
 TEST(Continuation, APeakBelongsToOnePartial) {
   const std::vector<std::vector<Sinusoid>> frames{at({1000, 1010}), at({1008})};
-  const std::vector<Partial> partials = continued(frames, kAnalysed_hz, {.shortest_s = 0});
+  const std::vector<Partial> partials = continued(frames, kAnalysed_hz, {.peaks = {}, .shortest_s = 0});
   ASSERT_EQ(partials.size(), 2U);
   EXPECT_EQ(partials[0].points.size(), 1U);
   EXPECT_EQ(partials[1].points.size(), 2U);
