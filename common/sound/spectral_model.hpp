@@ -18,7 +18,7 @@ struct SpectralParams {
   double kept_s = 0.06;
   SegmentTolerance tolerance;
   // Low tones are closer than short frames can tell, and blows shorter than long frames can tell.
-  double noise_split_hz = 1200;
+  double noise_split_hz = 1160;  // between two bins of either layer at 22050 Hz
   NoiseParams low_noise{.window = 1024, .points = 32};
   NoiseParams high_noise{.window = 256, .points = 26};
   TransientParams transients;

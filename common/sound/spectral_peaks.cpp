@@ -15,6 +15,11 @@ constexpr int kLobeSteps = 64;
 // Beyond so many side lobes, a line is more than 75 dB below its top.
 constexpr double kLobeReach = 10.0;  // in bins of a transform without padding
 
+// Side lobes are masked as far as they are louder than a 16-bit recording's noise, 60 bins without padding.
+constexpr double kMaskReach = 60.0;
+// They are louder by up to 3 dB if the amplitude changes within the frame.
+constexpr double kMaskMargin = 2.0;  // in power
+
 // Transform of a Hann window of `window` samples about its middle, at x bins of a transform of that size, for a window
 // of many samples: window / 2 sinc(x) / (1 - x^2).
 double hann_lobe(double x, int window) {
@@ -40,6 +45,10 @@ PeakFinder::PeakFinder(int window, double rate_hz, const PeakParams& params)
   reach_ = static_cast<int>(kLobeReach * padding);
   for (int i = 0; i <= (reach_ + 2) * kLobeSteps; ++i)
     lobe_.push_back(static_cast<float>(hann_lobe(i / (kLobeSteps * padding), window)));
+  for (int bin = 0; bin <= static_cast<int>(kMaskReach * padding); ++bin) {
+    const double x = bin / padding;  // the main lobe goes to 2
+    side_.push_back(x < 2.0 ? 0.0F : static_cast<float>(kMaskMargin * std::pow(1.0 / (pi * x * (x * x - 1.0)), 2.0)));
+  }
 }
 
 double PeakFinder::window_at(double bins) const {
@@ -72,7 +81,7 @@ PeakFinder::Line PeakFinder::estimated(int bin) const {
   return {.bin = bin + offset, .half = value / window_at(offset)};
 }
 
-std::vector<PeakFinder::Line> PeakFinder::pick() const {
+std::vector<PeakFinder::Line> PeakFinder::pick() {
   // Twice the amplitude's half under the window, squared.
   const double least = std::pow(0.25 * window_ * std::pow(10.0, params_.threshold_db / 20.0), 2.0);
   std::vector<int> tops;
@@ -83,12 +92,21 @@ std::vector<PeakFinder::Line> PeakFinder::pick() const {
     const float pa = power_[static_cast<std::size_t>(a)], pb = power_[static_cast<std::size_t>(b)];
     return pa != pb ? pa > pb : a < b;
   };
-  const auto most = std::min(tops.size(), static_cast<std::size_t>(params_.most));
-  std::partial_sort(tops.begin(), tops.begin() + static_cast<std::ptrdiff_t>(most), tops.end(), louder);
-  tops.resize(most);
+  std::ranges::sort(tops, louder);
+  mask_.assign(power_.size(), 0.0F);
   std::vector<Line> lines;
-  lines.reserve(most);
-  for (const int top : tops) lines.push_back(estimated(top));
+  for (const int top : tops) {
+    if (lines.size() == static_cast<std::size_t>(params_.most)) break;
+    const float power = power_[static_cast<std::size_t>(top)];
+    if (power < mask_[static_cast<std::size_t>(top)]) continue;
+    lines.push_back(estimated(top));
+    const int reach = static_cast<int>(side_.size()) - 1;
+    const int last = std::min(static_cast<int>(mask_.size()) - 1, top + reach);
+    for (int k = std::max(0, top - reach); k <= last; ++k) {
+      float& mask = mask_[static_cast<std::size_t>(k)];
+      mask = std::max(mask, power * side_[static_cast<std::size_t>(std::abs(k - top))]);
+    }
+  }
   return lines;
 }
 

@@ -29,7 +29,8 @@ struct PeakParams {
 // gamma) / (2 (alpha - 2 beta + gamma)) bins (Serra 1990). The amplitude and phase there follow from the transform W of
 // the Hann window, X(k) = a / 2 exp(j phase) W(k - f). With W a frame of two lines is their sum. So in each round each
 // peak, the loudest first, is estimated again from the frame's spectrum less that of all others. That fails if lines
-// are closer than one main lobe, 4 rate / window: they are one peak.
+// are closer than one main lobe, 4 rate / window: they are one peak. Maxima that may be side lobes of a louder peak are
+// none.
 class PeakFinder {
  public:
   PeakFinder(int window, double rate_hz, const PeakParams& params);
@@ -44,7 +45,7 @@ class PeakFinder {
   };
 
   void transform(std::span<const float> frame);
-  [[nodiscard]] std::vector<Line> pick() const;
+  [[nodiscard]] std::vector<Line> pick();
   void add(const Line& line, double sign);
   [[nodiscard]] Line estimated(int bin) const;
   [[nodiscard]] double window_at(double bins) const;  // W
@@ -59,6 +60,8 @@ class PeakFinder {
   std::vector<float> power_;
   std::vector<float> lobe_;  // W at steps of 1 / kLobeSteps bins
   int reach_ = 0;            // bins of the transform, on each side of a line, that its spectrum is taken for
+  std::vector<float> side_;  // |W / W(0)|^2 of the side lobes, by whole bins
+  std::vector<float> mask_;  // power below which a peak is a side lobe of a louder one
 };
 
 }  // namespace osteon::sound

@@ -67,6 +67,17 @@ TEST(SpectralPeaks, RefinementSeparatesTwoClosePartials) {
   EXPECT_GT(error(0).first, 2.0 * hz);
 }
 
+TEST(SpectralPeaks, SideLobesAreNone) {
+  // Those of a tone are 31 dB below it and less.
+  for (const double hz : {300.0, 2011.0, 5555.5}) {
+    EXPECT_EQ(PeakFinder(1000, kAnalysed_hz, {}).find(cosine_wave(hz, 0.5, 0.7, 1000, 500)).size(), 1U) << hz;
+    // A tone that is louder than the side lobes is found among them.
+    const std::vector<float> both =
+        added(cosine_wave(hz, 0.5, 0.7, 1000, 500), cosine_wave(hz + 200, 0.5 * 0.02, 0, 1000, 500));
+    EXPECT_EQ(PeakFinder(1000, kAnalysed_hz, {}).find(both).size(), 2U) << hz;
+  }
+}
+
 TEST(SpectralPeaks, AreTheLoudestAboveTheThreshold) {
   std::vector<float> sum(1000, 0.0F);
   for (int i = 1; i <= 5; ++i) sum = added(sum, cosine_wave(1000.0 * i, std::pow(10.0, -i), 0, 1000, 500));
@@ -109,7 +120,12 @@ TEST(Partials, AChirpIsFollowed) {
   // Frames at the ends are moved to the side.
   for (std::size_t m = 4; m + 5 < partials[0].points.size(); ++m)
     EXPECT_NEAR(partials[0].points[m].hz, 1000.0 + 1000.0 * static_cast<double>(m) * 128 / kAnalysed_hz, 0.5) << m;
-  EXPECT_GT(snr_db(samples, sound_with_phases(partials, kAnalysed_hz, 128, samples.size())), 30.0);
+  // A frame's phase is the mean over its window, whose variance is T^2 (1/12 - 1/(2 pi^2)). So it leads by pi r times
+  // that, where r is 1000 Hz/s, and the difference of the sounds is 2 sin(lead / 2) of the chirp.
+  const double window_s = 1000 / kAnalysed_hz;
+  const double lead = pi * 1000.0 * window_s * window_s * (1.0 / 12.0 - 1.0 / (2.0 * pi * pi));
+  EXPECT_NEAR(snr_db(samples, sound_with_phases(partials, kAnalysed_hz, 128, samples.size())),
+              -db(2.0 * std::sin(0.5 * lead)), 0.7);
 }
 
 TEST(Partials, AModulatedAmplitudeIsFollowed) {
