@@ -47,8 +47,8 @@ struct SpectralAnalysis {
 [[nodiscard]] SpectralAnalysis spectral_analysis(std::span<const float> samples, double rate_hz,
                                                  const SpectralParams& params = {});
 
-// s(t) = sum over the partials of A(t) cos(theta(t)) + e(t) (8.21): oscillators, whose phases begin at random, noise,
-// and the impacts in place of both. The same seed gives the same sound.
+// s(t) = sum over the partials of A(t) cos(theta(t)) + e(t) (8.21 to 8.23): oscillators, whose phases begin at random,
+// noise, and the impacts in place of both. The same seed gives the same sound.
 [[nodiscard]] std::vector<float> resynthesised(const SpectralModel& model, std::uint64_t seed);
 
 // The noise alone.
