@@ -24,7 +24,7 @@ struct SpectralParams {
   TransientParams transients;
 };
 
-// What is left of a sound when its phases are forgotten. Small enough to be kept for each tool.
+// What is left of a sound when its phases are forgotten.
 struct SpectralModel {
   double rate_hz = 0;
   std::size_t samples = 0;
