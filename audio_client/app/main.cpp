@@ -1,4 +1,4 @@
-// osteon-audio: joins a room and plays the sound of its tools, or analyses a recording.
+// osteon-audio: joins a room and plays the sound of its tools, or analyses or models a recording.
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
@@ -16,6 +16,7 @@
 #include <utility>
 
 #include "audio_client/app/analyse_command.hpp"
+#include "audio_client/app/model_command.hpp"
 #include "audio_client/net/state_subscription.hpp"
 #include "audio_client/output/audio_output.hpp"
 #include "audio_client/output/reconnecting_output.hpp"
@@ -284,6 +285,7 @@ int main(int argc, char** argv) {
   CLI::App app("Plays the sound of a room's tools: it follows speed, load and bone density.", kProgram);
   std::function<Result<std::string>()> command;
   audio::add_analyse_command(app, command);
+  audio::add_model_commands(app, command);
   app.require_subcommand(0, 1);
   app.add_option("--server", options.server, "HOST:PORT of osteon-server; needed to play");
   app.add_option("--room", options.room, "Name of the room; not needed where the server has one");

@@ -74,6 +74,8 @@ class Help(unittest.TestCase):
         self.assertIn("plan", completed("osteon-haptic", "pl"))
         self.assertIn("analyse", completed("osteon-audio", "an"))
         self.assertIn("--displacement", completed("osteon-audio", "analyse", "--di"))
+        self.assertIn("--refine", completed("osteon-audio", "model", "--re"))
+        self.assertIn("resynthesise", completed("osteon-audio", "re"))
         self.assertIn("--timeout", completed("osteon-viewer", "--ti"))
         self.assertIn("--language", completed("osteon", "--la"))
         self.assertEqual(completed("osteon-viewer", "--nothing-like-it"), [])

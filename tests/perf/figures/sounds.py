@@ -32,4 +32,37 @@ def analysis(run):
     return {"sound_analysis_speed": Measured(float(np.median(speeds)), None, min(speeds), max(speeds), 1)}
 
 
-GROUPS = {"sound_analysis": analysis}
+# Licences are in the README of that folder.
+RECORDINGS = {"drill": "chai3d_drill.wav", "saw": "opensfx_40_circular_saw.wav",
+              "hammer": "opensfx_39_smithy_hammer.wav"}
+
+
+def modelled(run, file, *arguments):
+    """The text of osteon-audio model, and how many times as fast as it sounds it was."""
+    text = run.output("osteon-audio", "model", file, *arguments)
+    return text, float(re.search(r"([\d.]+) times as fast", text)[1])
+
+
+def models(run):
+    run.say("spectral models of recordings")
+    file = run.folder / "recording.wav"
+    recording(file)
+    values = {}
+    for name, refine in (("sound_model_speed", 0), ("sound_model_refined_speed", 2)):
+        speeds = [modelled(run, file, "--refine", refine)[1] for _ in range(3)]
+        values[name] = Measured(float(np.median(speeds)), None, min(speeds), max(speeds), 1)
+    folder = run.shared_data("sound")
+    for name, wav in RECORDINGS.items():
+        if not folder:
+            run.skip(f"sound_model_{name}", "there is no shared/data beside the checkout")
+            numbers = [None] * 4
+        else:
+            text, _ = modelled(run, folder / wav, "--channel", "left")
+            snr = re.search(r"^sines, with phases +(\S+)", text, re.M)[1]
+            numbers = [float(x) for x in (snr, *re.search(r"^the model, no phases +\S+ +(.*)$", text, re.M)[1].split())]
+        values |= {f"sound_model_{name}_{what}": Measured(number)
+                   for what, number in zip(("snr", "psd", "mel", "envelope"), numbers)}
+    return values
+
+
+GROUPS = {"sound_analysis": analysis, "sound_model": models}

@@ -1,0 +1,89 @@
+#include "audio_client/app/model_command.hpp"
+
+#include <CLI/CLI.hpp>
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+
+#include "audio_client/analysis/analysis.hpp"
+#include "audio_client/analysis/model_report.hpp"
+#include "common/runtime/files.hpp"
+
+namespace osteon::audio {
+namespace {
+
+struct ModelArguments {
+  std::string file, channel, out, play;
+  int refinements = 2;
+  std::uint64_t seed = 1;
+};
+
+Result<std::string> run_model(const ModelArguments& a) {
+  // What would be found after the work is found before it.
+  if (auto usable = check_writable(a.out, "the model", "--out"); !usable) return tl::unexpected(usable.error());
+  if (auto usable = check_writable(a.play, "the sound", "--play"); !usable) return tl::unexpected(usable.error());
+  std::optional<sound::Channel> channel;
+  if (!a.channel.empty()) channel = sound::channel_of(a.channel);
+  const auto recording = sound::read_wav(a.file, channel);
+  if (!recording) return tl::unexpected(recording.error());
+  const ModelReport report = model_report(*recording, a.refinements, a.seed);
+  std::string text = to_text(report);
+  if (!a.out.empty()) {
+    if (auto written = write_file(a.out, report.bytes); !written) return tl::unexpected(written.error());
+    text += "written    " + a.out + "\n";
+  }
+  if (!a.play.empty()) {
+    if (auto written = sound::write_wav(a.play, report.sound, kAnalysisRate_hz); !written)
+      return tl::unexpected(written.error());
+    text += "written    " + a.play + "\n";
+  }
+  return text;
+}
+
+struct ResynthesiseArguments {
+  std::string model, out;
+  std::uint64_t seed = 1;
+};
+
+Result<std::string> run_resynthesis(const ResynthesiseArguments& a) {
+  if (auto usable = check_writable(a.out, "the sound", "OUT"); !usable) return tl::unexpected(usable.error());
+  const auto model = read_model(a.model);
+  if (!model) return tl::unexpected(model.error());
+  const std::vector<float> sound = sound::resynthesised(*model, a.seed);
+  if (auto written = sound::write_wav(a.out, sound, static_cast<int>(model->rate_hz)); !written)
+    return tl::unexpected(written.error());
+  return "written    " + a.out + "\n";
+}
+
+}  // namespace
+
+void add_model_commands(CLI::App& app, std::function<Result<std::string>()>& chosen) {
+  const auto model = std::make_shared<ModelArguments>();
+  CLI::App* command = app.add_subcommand(
+      "model", "Model a recording by partials, noise and impacts, and print how near the model's sound comes to it");
+  command->add_option("FILE", model->file, "PCM WAV of 16, 24 or 32 bits, 22050 to 48000 Hz, 0.25 s to 5 minutes")
+      ->required();
+  command->add_option("--out", model->out, "File for the model");
+  command->add_option("--play", model->play, "WAV file for the sound of the model");
+  command->add_option("--channel", model->channel, "Of a stereo recording: left, right or mean")
+      ->check(CLI::IsMember({"left", "right", "mean"}));
+  command
+      ->add_option("--refine", model->refinements,
+                   "Rounds in which each peak is estimated again without the others; 0 is the fastest")
+      ->check(CLI::Range(0, 20))
+      ->capture_default_str();
+  command->add_option("--seed", model->seed, "Of the phases and the noise: the same gives the same sound")
+      ->capture_default_str();
+  command->callback([model, &chosen] { chosen = [model] { return run_model(*model); }; });
+
+  const auto again = std::make_shared<ResynthesiseArguments>();
+  command = app.add_subcommand("resynthesise", "Make the sound of a model that the command model has written");
+  command->add_option("MODEL", again->model, "File of a model")->required();
+  command->add_option("OUT", again->out, "WAV file for its sound, 16 bit, mono")->required();
+  command->add_option("--seed", again->seed, "Of the phases and the noise: the same gives the same sound")
+      ->capture_default_str();
+  command->callback([again, &chosen] { chosen = [again] { return run_resynthesis(*again); }; });
+}
+
+}  // namespace osteon::audio

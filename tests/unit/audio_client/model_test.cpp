@@ -1,0 +1,109 @@
+// osteon-audio model and resynthesise: what they print and write, and what they say to wrong use.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <random>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "audio_client/analysis/model_report.hpp"
+#include "common/sound/wav_file.hpp"
+#include "tests/support/content.hpp"
+#include "tests/support/process.hpp"
+#include "tests/support/temp_dir.hpp"
+
+namespace osteon::audio {
+namespace {
+
+namespace fs = std::filesystem;
+
+class ModelProgram : public testing::Test {
+ protected:
+  ModelProgram() {
+    // Two seconds of a line in noise at 44.1 kHz.
+    std::mt19937 random(1);
+    std::normal_distribution<float> noise(0.0F, 0.02F);
+    std::vector<float> samples;
+    for (int i = 0; i < 88200; ++i)
+      samples.push_back(0.2F * static_cast<float>(std::sin(0.2 * static_cast<double>(i))) + noise(random));
+    EXPECT_TRUE(sound::write_wav(wav(), samples, 44100));
+  }
+  [[nodiscard]] fs::path wav() const { return temp_ / "drill.wav"; }
+  [[nodiscard]] std::string path(const char* name) const { return (temp_ / name).string(); }
+  [[nodiscard]] static test::RunResult run(const std::vector<std::string>& arguments) {
+    return test::run(test::program("osteon-audio"), arguments);
+  }
+
+  test::TempDir temp_;
+};
+
+TEST_F(ModelProgram, ItsFileSoundsAsWhatItPlays) {
+  const test::RunResult made =
+      run({"model", wav().string(), "--out", path("a.model"), "--play", path("a.wav"), "--seed", "3"});
+  ASSERT_EQ(made.exit_code, 0) << made.err;
+  EXPECT_THAT(made.out,
+              testing::AllOf(testing::HasSubstr("2.00 s"), testing::HasSubstr("mel_lsd_db"),
+                             testing::HasSubstr("the model, no phases"), testing::HasSubstr("times as fast")));
+  const test::RunResult again = run({"resynthesise", path("a.model"), path("b.wav"), "--seed", "3"});
+  ASSERT_EQ(again.exit_code, 0) << again.err;
+  EXPECT_EQ(test::content(temp_ / "a.wav"), test::content(temp_ / "b.wav"));
+  ASSERT_EQ(run({"resynthesise", path("a.model"), path("c.wav"), "--seed", "4"}).exit_code, 0);
+  EXPECT_NE(test::content(temp_ / "a.wav"), test::content(temp_ / "c.wav"));
+
+  const auto sound = sound::read_wav(temp_ / "a.wav");
+  ASSERT_TRUE(sound) << sound.error().message;
+  EXPECT_EQ(sound->rate_hz, 22050);
+  EXPECT_NEAR(sound->seconds(), 2.0, 0.001);
+  const auto model = read_model(path("a.model"));
+  ASSERT_TRUE(model) << model.error().message;
+  EXPECT_EQ(model->samples, sound->samples.size());
+}
+
+TEST_F(ModelProgram, WrongUseIsOneSentenceEach) {
+  ASSERT_EQ(run({"model", wav().string(), "--out", path("a.model")}).exit_code, 0);
+  const std::string whole = test::content(temp_ / "a.model");
+  const auto put = [&](const char* name, std::string_view bytes) {
+    std::ofstream(temp_ / name, std::ios::binary) << bytes;
+    return path(name);
+  };
+  std::string other = whole;
+  other[8] = 9;
+  fs::create_directory(temp_ / "folder");
+  std::ofstream(temp_ / "huge.model").close();
+  fs::resize_file(temp_ / "huge.model", 1ULL << 33U);
+  struct Wrong {
+    std::vector<std::string> arguments;
+    std::vector<std::string> says;
+  };
+  const std::vector<Wrong> cases = {
+      {{"model", "nothing.wav"}, {"nothing.wav", "give the path"}},
+      {{"model"}, {"FILE"}},
+      {{"model", path("a.model")}, {"a.model", "no WAV file"}},
+      {{"model", wav().string(), "--refine", "-1"}, {"--refine"}},
+      {{"model", wav().string(), "--out", "/proc/nowhere/a.model"}, {"/proc/nowhere/a.model", "--out"}},
+      {{"model", wav().string(), "--play", "/proc/nowhere/a.wav"}, {"/proc/nowhere/a.wav", "--play"}},
+      {{"resynthesise", path("a.model")}, {"OUT"}},
+      {{"resynthesise", "nothing.model", path("b.wav")}, {"nothing.model"}},
+      {{"resynthesise", path("folder"), path("b.wav")}, {"folder"}},
+      {{"resynthesise", path("huge.model"), path("b.wav")}, {"huge.model", "at most"}},
+      {{"resynthesise", wav().string(), path("b.wav")}, {"drill.wav", "no spectral model"}},
+      {{"resynthesise", put("cut.model", whole.substr(0, whole.size() / 2)), path("b.wav")}, {"cut.model", "damaged"}},
+      {{"resynthesise", put("other.model", other), path("b.wav")}, {"other.model", "version is 9"}},
+  };
+  for (const Wrong& wrong : cases) {
+    const test::RunResult result = run(wrong.arguments);
+    EXPECT_EQ(result.exit_code, 1) << wrong.says.front();
+    EXPECT_THAT(result.err, testing::StartsWith("osteon-audio: "));
+    for (const std::string& words : wrong.says) EXPECT_THAT(result.err, testing::HasSubstr(words));
+    EXPECT_EQ(std::ranges::count(result.err, '\n'), 1) << result.err;
+    EXPECT_EQ(result.out, "");
+  }
+}
+
+}  // namespace
+}  // namespace osteon::audio
