@@ -9,8 +9,8 @@ struct kiss_fftr_state;
 
 namespace osteon::sound {
 
-// Hann window w[k] = 0.5 (1 - cos(2 pi k / size)), k = 0 ... size - 1. Equation (8.8) divides by size - 1. With that,
-// half-overlapped windows have no constant sum, so (8.20) would modulate the signal. `size`: even, at least 2.
+// Hann window w[k] = 0.5 (1 - cos(2 pi k / size)), k = 0 ... size - 1. It is periodic, as spectra and
+// overlap-add use it; (8.8) divides by size - 1, and is the symmetric form. `size`: even, at least 2.
 [[nodiscard]] std::vector<float> hann_window(int size);
 
 // Sum of the squared samples of a window.

@@ -10,8 +10,9 @@ namespace osteon::sound {
 
 std::vector<float> resampled(std::span<const float> samples, double from_hz, double to_hz) {
   OSTEON_CHECK(from_hz > 0 && to_hz > 0);
-  if (from_hz == to_hz || samples.empty()) return {samples.begin(), samples.end()};
   const double ratio = to_hz / from_hz;
+  OSTEON_CHECK(ratio >= 1.0 / 256 && ratio <= 256);
+  if (from_hz == to_hz || samples.empty()) return {samples.begin(), samples.end()};
   std::vector<float> result(static_cast<std::size_t>(std::llround(static_cast<double>(samples.size()) * ratio)), 0.0F);
   SRC_DATA data{};
   data.data_in = samples.data();

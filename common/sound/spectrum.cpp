@@ -13,14 +13,17 @@ namespace osteon::sound {
 Spectrum power_spectrum(std::span<const float> samples, double rate_hz, int size) {
   OSTEON_CHECK(size >= 16 && (size & (size - 1)) == 0 && rate_hz > 0);
   const auto n = static_cast<std::size_t>(size);
+  // A whole window on a part of it would weigh that part as the window's quiet beginning.
+  const std::size_t length = std::clamp<std::size_t>(samples.size() / 2 * 2, 2, n);
   RealFft fft(size);
-  const std::vector<float> window = hann_window(size);
+  const std::vector<float> window = hann_window(static_cast<int>(length));
   Spectrum result{rate_hz / size, std::vector<double>(fft.bins(), 0.0)};
-  std::vector<float> frame(n);
+  std::vector<float> frame(n, 0.0F);
   std::vector<std::complex<float>> bins(fft.bins());
   int frames = 0;
-  for (std::size_t start = 0; frames == 0 || start + n <= samples.size(); start += n / 2, ++frames) {
-    for (std::size_t i = 0; i < n; ++i) frame[i] = start + i < samples.size() ? window[i] * samples[start + i] : 0.0F;
+  for (std::size_t start = 0; frames == 0 || start + length <= samples.size(); start += length / 2, ++frames) {
+    for (std::size_t i = 0; i < length; ++i)
+      frame[i] = start + i < samples.size() ? window[i] * samples[start + i] : 0.0F;
     fft.forward(frame, bins);
     for (std::size_t k = 0; k < bins.size(); ++k) {
       const double re = bins[k].real(), im = bins[k].imag();

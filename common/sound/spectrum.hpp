@@ -7,13 +7,15 @@
 namespace osteon::sound {
 
 // One-sided: power[k] belongs to k * bin_hz, for k = 0 ... size / 2. The sum is the mean square of the signal. A sine
-// of amplitude a has a^2 / 3 in its own bin and a^2 / 12 in each neighbour, if its frequency is that of a bin.
+// of amplitude a has a^2 / 3 in its own bin and a^2 / 12 in each neighbour, if its frequency is that of a bin and it
+// lasts for a window.
 struct Spectrum {
   double bin_hz = 0;
   std::vector<double> power;
 };
 
-// `size`: samples in a window, a power of two. A signal shorter than one window is padded with silence.
+// `size`: samples in a window, a power of two. A shorter signal has one window of its own length, before silence: its
+// power is right, but its lines are wider.
 [[nodiscard]] Spectrum power_spectrum(std::span<const float> samples, double rate_hz, int size = 4096);
 
 // Power spectral density of a bin, dB re full scale squared per hertz.

@@ -38,8 +38,6 @@ struct Stft {
   std::vector<std::complex<float>> values;  // frames rows of bins() values
 
   [[nodiscard]] std::size_t bins() const { return static_cast<std::size_t>(params.size) / 2 + 1; }
-  [[nodiscard]] double bin_hz() const { return rate_hz / params.size; }
-  [[nodiscard]] double time_s(std::size_t frame) const { return static_cast<double>(frame) * params.hop / rate_hz; }
   [[nodiscard]] std::span<const std::complex<float>> frame(std::size_t m) const {
     return std::span(values).subspan(m * bins(), bins());
   }

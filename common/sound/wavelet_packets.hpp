@@ -22,8 +22,8 @@ struct Band {
 };
 [[nodiscard]] Band packet_band(const Packet& packet, double rate_hz);
 
-// The filters that lead to the band, the last one first: A keeps the low half, D the high half. Decimation turns the
-// spectrum of a high half round, so letters and frequencies are related by a Gray code: ADAA4 is band 3 of level 4. The
+// The filters that lead to the band, the last one first: A keeps the low half, D the high half. Decimation reverses the
+// spectrum of a high half, so letters and frequencies are related by a Gray code: ADAA4 is band 3 of level 4. The
 // lists in 8.5.3 take the letters as binary digits and so exchange bands.
 [[nodiscard]] std::string packet_name(const Packet& packet);
 
