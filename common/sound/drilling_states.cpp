@@ -29,7 +29,7 @@ struct Levels {
   double frame_s = 0;
   std::size_t frames = 0;
   std::vector<std::array<double, kBands>> power;      // mean square in each band
-  std::vector<std::array<double, 2>> motor_and_mesh;  // power around the motor's and the mesh's line
+  std::vector<std::array<double, 2>> motor_and_mesh;  // power around their lines, or both 0
 };
 
 Levels levels_of(std::span<const float> samples, double rate_hz, const StateParams& params) {
@@ -44,15 +44,18 @@ Levels levels_of(std::span<const float> samples, double rate_hz, const StatePara
   const Gearbox gears;
   const std::array<double, 2> lines_hz = {3.0 * kCommutatorSegments * gears.motor() * spindle_hz,
                                           gears.motor_mesh() * spindle_hz};
+  // A hand's load changes the speed by some percent. Both bands are as wide, so that noise favours neither.
+  const double reach_hz = 0.05 * lines_hz[0];
   Levels levels{.frame_s = frames.hop / rate_hz, .power = {}, .motor_and_mesh = {}};
   for_each_frame(samples, frames, [&](std::size_t, std::span<const std::complex<float>> bins) {
     auto& power = levels.power.emplace_back();
     for (std::size_t b = 0; b < kBands; ++b)
       power[b] = scale * band_energy(bins, rate_hz, kEdges_hz[b], kEdges_hz[b + 1]);
     auto& lines = levels.motor_and_mesh.emplace_back();
-    // A hand's load changes the speed by some percent.
+    // Without the motor's line nothing can be compared, and both stay 0.
+    if (lines_hz[0] + reach_hz > 0.5 * rate_hz) return;
     for (std::size_t i = 0; i < 2; ++i)
-      lines[i] = scale * band_energy(bins, rate_hz, 0.95 * lines_hz[i], 1.05 * lines_hz[i]);
+      lines[i] = scale * band_energy(bins, rate_hz, lines_hz[i] - reach_hz, lines_hz[i] + reach_hz);
   });
   levels.frames = levels.power.size();
   return levels;
@@ -85,7 +88,8 @@ std::vector<double> scaled_rows(const Levels& levels) {
 struct Part {
   std::size_t first = 0, last = 0;  // frames first ... last - 1
   double seconds = 0;
-  double level_db = 0, low_db = 0;
+  double power = 0, low_power = 0;  // mean squares of all bands, and of the first
+  double level_db = 0, low_db = 0;  // the same, not below kFloor_db
   double motor_power = 0, mesh_power = 0;
   DrillingState state = DrillingState::free;
 
@@ -95,16 +99,15 @@ struct Part {
 
 Part part_of(const Levels& levels, std::size_t first, std::size_t last) {
   Part part{.first = first, .last = last, .seconds = static_cast<double>(last - first) * levels.frame_s};
-  double all = 0, low = 0;
   for (std::size_t m = first; m < last; ++m) {
-    for (const double power : levels.power[m]) all += power;
-    low += levels.power[m][0];
+    for (const double power : levels.power[m]) part.power += power;
+    part.low_power += levels.power[m][0];
     part.motor_power += levels.motor_and_mesh[m][0];
     part.mesh_power += levels.motor_and_mesh[m][1];
   }
   const auto frames = static_cast<double>(last - first);
-  part.level_db = floored_db(all / frames);
-  part.low_db = floored_db(low / frames);
+  part.power /= frames, part.low_power /= frames;
+  part.level_db = floored_db(part.power), part.low_db = floored_db(part.low_power);
   return part;
 }
 
@@ -155,7 +158,7 @@ void find_bone(std::vector<Part>& parts, const StateParams& params, std::optiona
     several = several || (part.state == DrillingState::cancellous && part.seconds >= kSustainedHigh_s);
   }
   // One kind of bone alone is the loudest, whatever it is. The first peak of cortical bone is the motor's, and that of
-  // cancellous bone is the gear's (8.5.4).
+  // cancellous bone is the gear's (8.5.4). If the recording's rate is too low for that, the bone counts as cortical.
   if (several || motor >= mesh) return;
   for (Part& part : parts)
     if (part.state == DrillingState::cortical) part.state = DrillingState::cancellous;
@@ -290,7 +293,7 @@ std::vector<StateSpan> drilling_states(std::span<const float> samples, double ra
     // Frame m has its middle at m * frame_s, so a part begins half a frame before the middle of its first one.
     const double from_s = spans.empty() ? 0.0 : (static_cast<double>(part.first) - 0.5) * levels.frame_s;
     if (!spans.empty()) spans.back().to_s = from_s;
-    spans.push_back({part.state, from_s, seconds, part.level_db, part.low_db});
+    spans.push_back({part.state, from_s, seconds, power_db(part.power), power_db(part.low_power)});
   }
   return spans;
 }

@@ -29,7 +29,7 @@ struct TimeSpan {
 };
 
 struct StateParams {
-  double frame_s = 0.01;         // from one level to the next; longer in recordings of more than kMostFrames of them
+  double frame_s = 0.01;         // from one level to the next; more in recordings of more than kMostFrames, or 60 s
   double off_db = 25;            // a drill that rests is that much below the loudest part [A]
   double silence_db = -75;       // re full scale: below it nothing runs [A]
   double distinct_db = 3;        // if running parts differ by less, they are all free [A]
@@ -37,17 +37,18 @@ struct StateParams {
   double cortical_from = 0.7;    // the same: from it on, cortical [A]
   double longest_burst_s = 0.4;  // of perforation, which "is very short" in 8.5.1 [A]
   double burst_db = 5;           // by which it exceeds the bone before it, below 400 Hz [A]
-  double spindle_rpm = 1400;     // to know the lines of motor and gear
+  double spindle_rpm = 1400;     // to know the lines of motor and gear; above 2745 the motor's is beyond 11025 Hz
   std::optional<TimeSpan> free;  // where the drill runs free, if the user says so
 };
 
 struct StateSpan {
   DrillingState state = DrillingState::before;
   double from_s = 0, to_s = 0;
-  double level_db = 0;  // re full scale, above 50 Hz
+  double level_db = 0;  // re full scale, of 50 to 8000 Hz
   double low_db = 0;    // of 50 to 400 Hz
 };
 
+// The partition compares all pairs of frames. In 300 s a frame lasts 50 ms, and a part at least three of them.
 inline constexpr int kMostFrames = 6000;
 
 // Spans in order of time, without gaps, from 0 to the end. Neighbours differ in state. Empty for less than 0.1 s.
