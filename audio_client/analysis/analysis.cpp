@@ -13,7 +13,7 @@ namespace {
 
 constexpr int kPeaks = 8;
 constexpr double kPeaksApart_hz = 60;
-constexpr double kStandsOut_db = 6;
+constexpr double kStandsOut_db = 8;
 // Columns of a spectrogram. More are neither seen in a picture nor read in a table.
 constexpr std::size_t kMostColumns = 2000;
 
@@ -32,9 +32,25 @@ std::optional<sound::TimeSpan> longest(const std::vector<sound::StateSpan>& stat
   return best;
 }
 
+// The level that five bins of the neighbourhood have, as many as the level of a peak has. It is their median: other
+// lines in the neighbourhood, such as sidebands, do not raise it. The line's own main lobe is left out.
+double around_db(const sound::Spectrum& spectrum, double hz) {
+  constexpr std::ptrdiff_t kNearest = 4, kFurthest = 20;  // bins
+  const auto middle = static_cast<std::ptrdiff_t>(std::lround(hz / spectrum.bin_hz));
+  std::vector<double> around;
+  for (std::ptrdiff_t k = middle - kFurthest; k <= middle + kFurthest; ++k)
+    if (k > 0 && k < std::ssize(spectrum.power) && std::abs(k - middle) >= kNearest)
+      around.push_back(spectrum.power[static_cast<std::size_t>(k)]);
+  const auto half = around.begin() + std::ssize(around) / 2;
+  std::ranges::nth_element(around, half);
+  return sound::power_db(5.0 * *half);
+}
+
 std::vector<FoundLine> find_lines(const SoundAnalysis& a) {
   const StateSpectrum* free = spectrum_of(a, sound::DrillingState::free);
-  const sound::Spectrum& spectrum = free ? free->spectrum : a.whole;
+  // In less than a window, lines are too wide to be told from noise.
+  const bool lasts = free && (free->span.to_s - free->span.from_s) * a.rate_hz >= a.params.spectrum_window;
+  const sound::Spectrum& spectrum = lasts ? free->spectrum : a.whole;
   const std::vector<sound::Peak> peaks = sound::strongest_peaks(spectrum, 400, 2 * spectrum.bin_hz);
   std::vector<FoundLine> found;
   for (const sound::GearLine& line : sound::gear_table(sound::Gearbox{}, a.params.spindle_rpm)) {
@@ -43,10 +59,7 @@ std::vector<FoundLine> find_lines(const SoundAnalysis& a) {
     const auto peak =
         std::ranges::find_if(peaks, [&](const sound::Peak& heard) { return std::abs(heard.hz - line.hz) <= reach_hz; });
     if (peak == peaks.end()) continue;
-    // The mean of five bins of the neighbourhood: as many as the level of a peak has.
-    const double from_hz = std::max(0.0, peak->hz - 20 * spectrum.bin_hz), to_hz = peak->hz + 20 * spectrum.bin_hz;
-    const double around_db = sound::band_db(spectrum, from_hz, to_hz) - 10.0 * std::log10(40.0 / 5.0);
-    if (peak->level_db > around_db + kStandsOut_db) found.back().peak = *peak;
+    if (peak->level_db > around_db(spectrum, peak->hz) + kStandsOut_db) found.back().peak = *peak;
   }
   return found;
 }
@@ -59,12 +72,13 @@ std::optional<Difference> difference_of(const SoundAnalysis& a) {
   if (!free || !drilled) return std::nullopt;
 
   const sound::Stft transform = sound::stft(a.samples, a.rate_hz, {});
-  const auto frame_at = [&](double s) {
-    const double frame = std::round(s * a.rate_hz / transform.params.hop);
+  const auto frame_at = [&](double s) { return s * a.rate_hz / transform.params.hop; };
+  const auto whole = [&](double frame) {
     return static_cast<std::size_t>(std::clamp(frame, 0.0, static_cast<double>(transform.frames)));
   };
-  // The frames that lie within the span with both halves.
-  const std::size_t first = frame_at(free->from_s) + 1, last = frame_at(free->to_s);
+  // The frames that lie within the span with both halves, each as long as a hop.
+  const std::size_t first = whole(std::ceil(frame_at(free->from_s)) + 1.0),
+                    last = whole(std::floor(frame_at(free->to_s)));
   if (first >= last) return std::nullopt;
   const sound::StationarySpectrum stationary = sound::stationary_spectrum(transform, first, last);
   Difference difference{.free = *free,
@@ -101,6 +115,8 @@ SoundAnalysis analyse(const sound::WavSound& recording, const AnalysisParams& pa
   SoundAnalysis a;
   a.params = params;
   a.file_rate_hz = recording.rate_hz, a.file_channels = recording.channels, a.file_bits = recording.bits;
+  a.file_floating = recording.floating, a.announced_s = recording.announced_s;
+  a.from_s = recording.from_s, a.file_s = recording.file_s;
   a.samples = sound::resampled(recording.samples, recording.rate_hz, a.rate_hz);
   a.level_db = sound::rms_db(a.samples);
   a.peak = sound::peak(recording.samples);

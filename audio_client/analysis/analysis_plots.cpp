@@ -104,7 +104,8 @@ NamedPicture density(const SoundAnalysis& a) {
   // Below 900 Hz the names would lie on each other.
   int named = 0;
   for (const FoundLine& found : a.lines)
-    if (found.line.hz > 900) plot.note(found.line.hz, 4 + 11 * (named++ % 8), found.line.name, kLineInk);
+    if (found.line.hz > 900 && found.line.hz < 0.5 * a.rate_hz)
+      plot.note(found.line.hz, 4 + 11 * (named++ % 8), found.line.name, kLineInk);
   return {"psd.png", std::move(page)};
 }
 
@@ -112,7 +113,9 @@ NamedPicture spectrogram(const SoundAnalysis& a) {
   constexpr double kRange_db = 80;
   Picture page(kWidth, 420, kPaper);
   const sound::Spectrogram& s = a.spectrogram;
-  const double loudest_db = sound::power_db(*std::ranges::max_element(s.power));
+  // Silence stays dark: it is not the warmest only because nothing is louder.
+  constexpr double kQuietest_db = -75;
+  const double loudest_db = std::max(kQuietest_db, sound::power_db(*std::ranges::max_element(s.power)));
   Plot plot(page, {kLeft, 24, kPlotWidth, 346}, time_axis(a), {0.0, 0.5 * a.rate_hz, "frequency, Hz"});
   plot.map([&](double x, double y) {
     const auto column = std::min(s.columns - 1, static_cast<std::size_t>(x / s.column_s));

@@ -31,6 +31,28 @@ __attribute__((format(printf, 1, 2))) std::string formatted(const char* format, 
 // Further digits say nothing, and may depend on the machine.
 double rounded(double value, double parts = 1e3) { return std::round(value * parts) / parts; }
 
+double seconds_of(const SoundAnalysis& a) { return static_cast<double>(a.samples.size()) / a.rate_hz; }
+
+std::string channels_text(int channels) {
+  return channels == 1 ? "mono" : channels == 2 ? "stereo" : std::to_string(channels) + " channels";
+}
+
+// What the user should know of the recording, a line each.
+std::string notes_of(const SoundAnalysis& a) {
+  std::string text;
+  if (a.announced_s && *a.announced_s > 0)
+    text += formatted("note       the header announces %.4g s; %.4g s are there\n", *a.announced_s, a.file_s);
+  if (a.announced_s && *a.announced_s == 0)
+    text += formatted("note       the header gives no length; %.4g s are there\n", a.file_s);
+  if (a.file_bits == 8)
+    text += "note       8 bits: their quantisation noise, about -53 dB re full scale, hides a quiet room\n";
+  const auto silent = [](const sound::StateSpan& span) { return span.state == sound::DrillingState::before; };
+  if (std::ranges::all_of(a.states, silent))
+    text += std::string("note       no drill was heard") +
+            (a.file_channels > 1 ? "; is it the right --channel?\n" : "; is it the right recording?\n");
+  return text;
+}
+
 json level_json(const SoundAnalysis& a, double level_db) {
   json level = {{"db_full_scale", rounded(level_db)}};
   if (a.params.full_scale_pa) level["db_spl"] = rounded(sound::sound_level_db(level_db, *a.params.full_scale_pa));
@@ -162,9 +184,13 @@ std::string band_table(const SoundAnalysis& a, std::span<const DisplacementRow> 
 }  // namespace
 
 std::string to_text(const SoundAnalysis& a) {
-  const double seconds = static_cast<double>(a.samples.size()) / a.rate_hz;
-  std::string text = formatted("recording  %.3f s, %d Hz, %d bits, %s; analysed at %.0f Hz\n", seconds, a.file_rate_hz,
-                               a.file_bits, a.file_channels == 1 ? "mono" : "stereo", a.rate_hz);
+  const double seconds = seconds_of(a);
+  std::string text =
+      formatted("recording  %.3f s, %d Hz, %d bits%s, %s; analysed at %.0f Hz\n", seconds, a.file_rate_hz, a.file_bits,
+                a.file_floating ? " float" : "", channels_text(a.file_channels).c_str(), a.rate_hz);
+  if (a.from_s > 0 || a.file_s > seconds + 0.001)
+    text += formatted("part       from %.3f s of %.3f s; all times count from there\n", a.from_s, a.file_s);
+  text += notes_of(a);
   text += formatted("level      %.1f dB re full scale", a.level_db);
   if (a.params.full_scale_pa)
     text += formatted(", %.1f dB re 20 uPa", sound::sound_level_db(a.level_db, *a.params.full_scale_pa));
@@ -196,7 +222,10 @@ std::string to_json(const SoundAnalysis& a) {
        {{"sample_rate_hz", a.file_rate_hz},
         {"channels", a.file_channels},
         {"bits", a.file_bits},
-        {"seconds", rounded(static_cast<double>(a.samples.size()) / a.rate_hz)},
+        {"format", a.file_floating ? "float" : "integer"},
+        {"seconds", rounded(seconds_of(a))},
+        {"from_s", rounded(a.from_s)},
+        {"file_s", rounded(a.file_s)},
         {"peak", rounded(a.peak, 1e6)},
         {"level", level_json(a, a.level_db)}}},
       {"analysis_rate_hz", a.rate_hz},
@@ -208,6 +237,7 @@ std::string to_json(const SoundAnalysis& a) {
       {"gear_lines", lines_json(a)},
       {"difference", nullptr},
   };
+  if (a.announced_s) report["recording"]["announced_s"] = rounded(*a.announced_s);
   if (a.difference)
     report["difference"] = {{"free_from_s", rounded(a.difference->free.from_s)},
                             {"free_to_s", rounded(a.difference->free.to_s)},

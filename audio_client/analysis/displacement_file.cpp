@@ -41,6 +41,8 @@ std::string_view take_line(std::string_view& text) {
 
 Result<std::vector<DisplacementRow>> read_displacement(const std::filesystem::path& file, double start_s) {
   std::error_code error;
+  if (std::filesystem::is_directory(file, error))
+    return bad_input(file.string() + " is a folder; give --displacement a table in it");
   if (!std::filesystem::is_regular_file(file, error))
     return failure(ErrorCode::not_found, "there is no file " + file.string() +
                                              "; give --displacement a table with the columns time_s and " +
@@ -50,6 +52,8 @@ Result<std::vector<DisplacementRow>> read_displacement(const std::filesystem::pa
   const auto text = read_file(file);
   if (!text) return tl::unexpected(text.error());
   std::string_view rest = *text;
+  // The byte order mark of a spreadsheet's "CSV UTF-8".
+  if (rest.starts_with("\xEF\xBB\xBF")) rest.remove_prefix(3);
   const std::vector<std::string_view> columns = fields_of(take_line(rest));
   const auto column = [&](std::string_view name) {
     return static_cast<std::size_t>(std::ranges::find(columns, name) - columns.begin());

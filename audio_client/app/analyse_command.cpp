@@ -12,6 +12,7 @@
 #include "audio_client/analysis/analysis.hpp"
 #include "audio_client/analysis/analysis_report.hpp"
 #include "audio_client/analysis/displacement_file.hpp"
+#include "common/core/bounded_text.hpp"
 
 namespace osteon::audio {
 namespace {
@@ -19,17 +20,35 @@ namespace {
 struct AnalyseArguments {
   std::string file, channel, displacement, out;
   std::vector<double> free_s;
-  double spindle_rpm = 1400, displacement_start_s = 0;
-  std::optional<double> full_scale_pa;
+  double spindle_rpm = 1400, displacement_start_s = 0, from_s = 0;
+  std::optional<double> to_s, full_scale_pa;
 };
+
+std::string shown(double value) {
+  std::array<char, 32> text{};
+  std::snprintf(text.data(), text.size(), "%.6g", value);
+  return text.data();
+}
 
 Result<std::optional<sound::TimeSpan>> free_span(const AnalyseArguments& a, double seconds) {
   if (a.free_s.empty()) return std::optional<sound::TimeSpan>();
   const sound::TimeSpan span{a.free_s[0], a.free_s[1]};
   if (span.from_s < 0 || span.to_s > seconds || span.to_s - span.from_s < 0.1)
-    return bad_input("--free must be two times within the " + std::to_string(seconds) + " s of " + a.file +
+    return bad_input("--free must be two times within the " + shown(seconds) + " s of " + a.file +
                      ", the second at least 0.1 s after the first");
   return std::optional(span);
+}
+
+// The displacement over the recording's time; empty if none is given.
+Result<std::vector<DisplacementRow>> displacement_of(const AnalyseArguments& a, double seconds) {
+  if (a.displacement.empty()) return std::vector<DisplacementRow>();
+  auto rows = read_displacement(a.displacement, a.displacement_start_s);
+  if (rows && (rows->front().time_s > seconds || rows->back().time_s < 0))
+    return bad_input(a.displacement + ": its times are " + shown(rows->front().time_s + a.displacement_start_s) +
+                     " to " + shown(rows->back().time_s + a.displacement_start_s) + " s, and the recording has " +
+                     shown(a.displacement_start_s) + " to " + shown(a.displacement_start_s + seconds) +
+                     " s; give --displacement-start the table's time at which the recording begins");
+  return rows;
 }
 
 Result<std::string> run_analysis(const AnalyseArguments& a) {
@@ -37,18 +56,16 @@ Result<std::string> run_analysis(const AnalyseArguments& a) {
   std::error_code ignored;
   if (!a.out.empty() && std::filesystem::exists(a.out, ignored))
     return failure(ErrorCode::exists, a.out + " is already there; give --out another name or remove it first");
-  std::optional<sound::Channel> channel;
-  if (!a.channel.empty()) channel = sound::channel_of(a.channel);
-  const auto recording = sound::read_wav(a.file, channel);
+  sound::WavPart part{.channel = {}, .from_s = a.from_s, .to_s = a.to_s};
+  if (!a.channel.empty() && !(part.channel = sound::channel_of(a.channel)))
+    return bad_input("--channel must be left, right, mean or a number from 1 to " +
+                     std::to_string(sound::kMostChannels) + ", not " + bounded_text(a.channel, 40));
+  const auto recording = sound::read_wav(a.file, part);
   if (!recording) return tl::unexpected(recording.error());
   const auto free = free_span(a, recording->seconds());
   if (!free) return tl::unexpected(free.error());
-  std::vector<DisplacementRow> displacement;
-  if (!a.displacement.empty()) {
-    auto rows = read_displacement(a.displacement, a.displacement_start_s);
-    if (!rows) return tl::unexpected(rows.error());
-    displacement = std::move(*rows);
-  }
+  const auto displacement = displacement_of(a, recording->seconds());
+  if (!displacement) return tl::unexpected(displacement.error());
 
   AnalysisParams params;
   params.spindle_rpm = a.spindle_rpm;
@@ -63,7 +80,7 @@ Result<std::string> run_analysis(const AnalyseArguments& a) {
                 work_s, recording->seconds() / work_s);
   std::string text = to_text(analysis) + speed.data();
   if (a.out.empty()) return text;
-  if (auto written = write_analysis(analysis, displacement, a.out); !written) return tl::unexpected(written.error());
+  if (auto written = write_analysis(analysis, *displacement, a.out); !written) return tl::unexpected(written.error());
   return text + "written    " + a.out + ": analysis.json, tables (*.csv) and pictures (*.png)\n";
 }
 
@@ -74,26 +91,39 @@ void add_analyse_command(CLI::App& app, std::function<Result<std::string>()>& ch
   AnalyseArguments& a = *shared;
   CLI::App* command = app.add_subcommand(
       "analyse", "Analyse a recorded drilling: its states, spectra, wavelet packets, and the lines of the gears");
-  command->add_option("FILE", a.file, "PCM WAV of 16, 24 or 32 bits, 22050 to 48000 Hz, 0.25 s to 5 minutes")
-      ->required();
-  command->add_option("--out", a.out,
-                      "Folder, made by this command: analysis.json, tables (psd.csv, spectrogram.csv, packets.csv, "
-                      "states.csv, gears.csv, bands.csv), a picture of each, and the sound of the bone alone "
-                      "(difference.wav)");
-  command->add_option("--channel", a.channel, "Of a stereo recording: left, right or mean")
-      ->check(CLI::IsMember({"left", "right", "mean"}));
-  command->add_option("--rpm", a.spindle_rpm, "Speed of the spindle, which says where the lines of the gears are")
+  command->add_option("FILE", a.file, "WAV or RF64, PCM or float, 22050 to 384000 Hz, 0.25 s to 5 minutes")->required();
+  CLI::Option* out =
+      command->add_option("--out", a.out,
+                          "Folder, made by this command: analysis.json, tables (psd.csv, spectrogram.csv, packets.csv, "
+                          "states.csv, gears.csv, bands.csv), pictures, and the sound difference (difference.wav)");
+  command->add_option("--channel", a.channel, "Of several that differ: left, right, mean, or its number from 1 on");
+  command->add_option("--from", a.from_s, "Seconds of the recording at which the part begins that is analysed")
+      ->check(CLI::Range(0.0, 1e6))
+      ->capture_default_str();
+  command
+      ->add_option("--to", a.to_s,
+                   "Seconds of the recording at which it ends; by default, the recording's end. All "
+                   "other times count from --from")
+      ->check(CLI::Range(0.0, 1e6));
+  command
+      ->add_option("--rpm", a.spindle_rpm,
+                   "Speed of the spindle, which says where the lines of the gears are; they are those of "
+                   "the dissertation's drill")
       ->check(CLI::Range(10.0, 100000.0))
       ->capture_default_str();
   command
       ->add_option("--free", a.free_s,
                    "FROM TO: seconds in which the drill ran free; by default the longest such state that is found")
       ->expected(2);
-  command->add_option("--displacement", a.displacement,
-                      "CSV with time_s and displacement_mm, or a session log of osteon-haptic: drawn over the bands");
+  CLI::Option* displacement =
+      command
+          ->add_option("--displacement", a.displacement,
+                       "CSV with time_s and displacement_mm, or a session log of osteon-haptic: drawn over the bands")
+          ->needs(out);
   command
       ->add_option("--displacement-start", a.displacement_start_s,
                    "Time in that table at which the recording begins, seconds")
+      ->needs(displacement)
       ->check(CLI::Range(-1e6, 1e6))
       ->capture_default_str();
   command

@@ -1,4 +1,4 @@
-// Recordings as PCM WAV files (Figure 8.4).
+// Recordings as WAV files (Figure 8.4).
 #pragma once
 #include <filesystem>
 #include <optional>
@@ -10,26 +10,40 @@
 
 namespace osteon::sound {
 
-// Which part of a stereo recording is meant.
-enum class Channel { left, right, mean };
-[[nodiscard]] std::optional<Channel> channel_of(std::string_view name);  // "left", "right", "mean"
+// Which channel of a recording is meant: its number from 1 on, or the mean of all.
+enum class Channel : int { mean = 0, left = 1, right = 2 };
+inline constexpr int kMostChannels = 64;
+// "left", "right", "mean", or a number from 1 to kMostChannels.
+[[nodiscard]] std::optional<Channel> channel_of(std::string_view name);
+
+// The part of a file that is read.
+struct WavPart {
+  std::optional<Channel> channel = {};  // needed only if there are several that differ
+  double from_s = 0;
+  std::optional<double> to_s = {};  // the end, if not given
+};
 
 struct WavSound {
-  int rate_hz = 0;             // SampleRate
-  int channels = 1;            // NumChannels of the file
-  int bits = 16;               // BitsPerSample
-  std::vector<float> samples;  // of one channel, or of the mean of both; 1 is full scale
+  int rate_hz = 0;                         // SampleRate
+  int channels = 1;                        // NumChannels of the file
+  int bits = 16;                           // BitsPerSample
+  bool floating = false;                   // AudioFormat: IEEE float, or else integers
+  double from_s = 0;                       // of the file, at which the samples begin
+  double file_s = 0;                       // of sound in the file
+  std::optional<double> announced_s = {};  // what its header says, if that is more; 0 if it says nothing
+  std::vector<float> samples;              // of one channel, or of the mean of all; 1 is full scale
 
   [[nodiscard]] double seconds() const { return static_cast<double>(samples.size()) / rate_hz; }
 };
 
-inline constexpr int kLowestRate_hz = 22050, kHighestRate_hz = 48000;
+inline constexpr int kLowestRate_hz = 22050, kHighestRate_hz = 384000;
 inline constexpr double kShortest_s = 0.25, kLongest_s = 300.0;
 
-// Reads integer PCM of 16, 24 or 32 bits, with one channel, or two of which `channel` says which one is meant. Refuses
-// 8 bits, whose rounding is louder than a quiet room, rates and lengths beyond the limits above, and files that end
-// before their header says so. Errors: not_found, invalid_input, unsupported; one sentence with file, field and remedy.
-[[nodiscard]] Result<WavSound> read_wav(const std::filesystem::path& file, std::optional<Channel> channel = {});
+// Reads WAV and RF64: integer PCM of 8 to 32 bits, or float of 32 or 64. Several channels need `channel`, unless all
+// are equal. A header that announces more than there is, as a recorder leaves it that streams or loses power, is no
+// error: see `announced_s`. Refuses rates and lengths beyond the limits above, and samples that are no numbers. Errors:
+// not_found, invalid_input, unsupported; one sentence with file, field and remedy.
+[[nodiscard]] Result<WavSound> read_wav(const std::filesystem::path& file, const WavPart& part = {});
 
 // Writes mono PCM of 16 bits. Samples beyond full scale are clipped. Error: internal (disk), naming the file.
 [[nodiscard]] Result<void> write_wav(const std::filesystem::path& file, std::span<const float> samples, int rate_hz);

@@ -7,18 +7,21 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
-#include <ctime>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <set>
 #include <sstream>
 #include <string>
 #include <string_view>
+#include <tuple>
+#include <utility>
 #include <vector>
 
 #include "audio_client/analysis/analysis.hpp"
+#include "audio_client/analysis/analysis_plots.hpp"
 #include "audio_client/analysis/analysis_report.hpp"
+#include "audio_client/analysis/plot.hpp"
 #include "audio_client/synth/drill_synth.hpp"
 #include "common/sound/levels.hpp"
 #include "tests/support/content.hpp"
@@ -26,6 +29,7 @@
 #include "tests/support/shared_data.hpp"
 #include "tests/support/temp_dir.hpp"
 #include "tests/unit/audio_client/scripted_drilling.hpp"
+#include "tests/unit/sound/signals.hpp"
 
 namespace osteon::audio {
 namespace {
@@ -56,6 +60,8 @@ DrillingState state_at(const SoundAnalysis& analysis, double time_s) {
   return analysis.states.back().state;
 }
 
+// The synthesis was made from 8.5.4, and the rules are those of 8.5.4. So this shows that both agree, and not that real
+// bone is recognised.
 TEST(SoundAnalysis, TheSynthesisIsHeardAsWhatItPlays) {
   test::ScriptedDrilling script;
   const sound::WavSound recording = scripted_recording(script);
@@ -73,7 +79,6 @@ TEST(SoundAnalysis, TheSynthesisIsHeardAsWhatItPlays) {
   }
   EXPECT_EQ(analysis.states.front().state, DrillingState::before);
   EXPECT_EQ(analysis.states.back().state, DrillingState::after);
-  // The hand piece's own lines, at the speed of the script.
   ASSERT_TRUE(analysis.difference);
   EXPECT_EQ(analysis.difference->samples.size(), analysis.samples.size());
 }
@@ -106,7 +111,7 @@ TEST(SoundAnalysis, SpectralSubtractionLeavesTheBone) {
 TEST(SoundAnalysis, RealRecordings) {
   const auto shared = test::find_shared();
   if (!shared) GTEST_SKIP() << "SKIPPED: no recordings: the folder shared/ is not beside the checkout";
-  const auto drill = sound::read_wav(*shared / "data/sound/chai3d_drill.wav", sound::Channel::left);
+  const auto drill = sound::read_wav(*shared / "data/sound/chai3d_drill.wav", {.channel = sound::Channel::left});
   ASSERT_TRUE(drill) << drill.error().message;
   AnalysisParams params;
   params.spindle_rpm = 1425;
@@ -119,6 +124,11 @@ TEST(SoundAnalysis, RealRecordings) {
   // Its loudest line, near 2280 Hz.
   ASSERT_TRUE(twice_mesh->peak);
   EXPECT_NEAR(twice_mesh->peak->hz, 2280, 5);
+  // What its description says is heard.
+  for (const double hz : {2280.0, 3420.0, 6840.0})
+    EXPECT_TRUE(std::ranges::any_of(steady.spectra.front().peaks, [&](const sound::Peak& peak) {
+      return std::abs(peak.hz - hz) < 15;
+    })) << hz;
 
   const auto saw = sound::read_wav(*shared / "data/sound/opensfx_40_circular_saw.wav");
   ASSERT_TRUE(saw) << saw.error().message;
@@ -132,43 +142,135 @@ TEST(SoundAnalysis, RealRecordings) {
   EXPECT_NEAR(cutting->to_s, 3.3, 0.15);
 }
 
-TEST(SoundAnalysis, LongRecordingsAreAnalysedInBoundedTime) {
-  sound::WavSound recording;
-  recording.rate_hz = 44100;
-  std::uint32_t random = 1;
-  for (int i = 0; i < 30 * 44100; ++i) {
-    random = random * 1664525U + 1013904223U;
-    recording.samples.push_back(1e-10F * static_cast<float>(random >> 1U) - 0.1F);
-  }
-  const std::clock_t begin = std::clock();
-  const SoundAnalysis analysis = analyse(recording, {});
-  const double work_s = static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC;
-  std::printf("analysed 30 s in %.2f s of a processor: %.0f times as fast as it sounds\n", work_s, 30 / work_s);
-  // Twenty times is the goal, which deploy/figures measures. A sanitizer takes most of it.
-  EXPECT_GT(30 / work_s, 2);
-  EXPECT_LE(analysis.spectrogram.columns, 2000U);
+std::vector<float> noise_with(double noise, const std::vector<std::pair<double, double>>& tones, double seconds) {
+  const auto count = static_cast<std::size_t>(seconds * kAnalysisRate_hz);
+  std::vector<float> samples = sound::white_noise(noise, count, 7);
+  for (const auto& [hz, amplitude] : tones)
+    samples = sound::added(std::move(samples), sound::tone(hz, amplitude, count, kAnalysisRate_hz));
+  return samples;
 }
 
-// The width and height of a PNG file, and how many colours it has.
-struct PngFacts {
+std::optional<sound::Peak> peak_of(const SoundAnalysis& analysis, std::string_view line) {
+  return std::ranges::find(analysis.lines, line, [](const FoundLine& of) { return of.line.name; })->peak;
+}
+
+TEST(SoundAnalysis, LinesAreFoundInNoiseBesideTheirSidebands) {
+  // The output mesh at 1120 Hz with the sidebands of its planets (8.5.2), the motor's mesh, and no other line.
+  const double side = 0.05 * std::pow(10.0, -1.0 / 20);
+  const sound::WavSound recording{
+      .rate_hz = kAnalysisRate_hz,
+      .samples =
+          noise_with(0.01, {{1119.84, 0.05}, {1119.84 - 74.66, side}, {1119.84 + 74.66, side}, {4014.7, 0.02}}, 4.0)};
+  const SoundAnalysis analysis = analyse(recording, {});
+  for (const auto& [line, hz, amplitude] :
+       {std::tuple{"output mesh", 1119.84, 0.05}, std::tuple{"motor mesh", 4014.7, 0.02}}) {
+    const auto peak = peak_of(analysis, line);
+    ASSERT_TRUE(peak) << line;
+    EXPECT_NEAR(peak->hz, hz, 1) << line;
+    EXPECT_NEAR(peak->level_db, 20 * std::log10(amplitude) - 3.01, 0.5) << line;
+  }
+  for (const char* line : {"motor spin", "output mesh x2", "output mesh x3", "commutation", "commutation x3"})
+    EXPECT_FALSE(peak_of(analysis, line)) << line;
+}
+
+TEST(SoundAnalysis, AWeakLineIsNoLine) {
+  // 3 dB above five bins of the noise around it: 0.01^2 * 5 / 2048, and a half of the amplitude's square.
+  const double amplitude = std::sqrt(2 * 1e-4 * 5 / 2048);
+  const SoundAnalysis analysis =
+      analyse({.rate_hz = kAnalysisRate_hz, .samples = noise_with(0.01, {{4014.7, amplitude}}, 4.0)}, {});
+  EXPECT_FALSE(peak_of(analysis, "motor mesh"));
+}
+
+TEST(SoundAnalysis, AHighRateIsConvertedFirst) {
+  const auto count = static_cast<std::size_t>(2 * 192000);
+  sound::WavSound recording{.rate_hz = 192000, .samples = sound::tone(1119.84, 0.1, count, 192000)};
+  recording.samples = sound::added(std::move(recording.samples), sound::tone(40000, 0.5, count, 192000));
+  const SoundAnalysis analysis = analyse(recording, {});
+  EXPECT_EQ(analysis.samples.size(), 2U * kAnalysisRate_hz);
+  EXPECT_NEAR(analysis.level_db, -23.01, 0.05);
+  ASSERT_TRUE(peak_of(analysis, "output mesh"));
+  EXPECT_NEAR(peak_of(analysis, "output mesh")->hz, 1119.84, 1);
+}
+
+TEST(SoundAnalysis, OnlyFramesWithinTheFreeSpanAreSubtracted) {
+  // The free sound ends 0.52 hops after a frame's middle, before one that is 50 dB louder.
+  constexpr double kHop_s = 512.0 / kAnalysisRate_hz, kEnd_s = 43.52 * kHop_s;
+  sound::WavSound recording{.rate_hz = kAnalysisRate_hz, .samples = noise_with(0.001, {}, kEnd_s)};
+  const std::vector<float> loud = noise_with(0.3, {}, 1.5);
+  recording.samples.insert(recording.samples.end(), loud.begin(), loud.end());
+  AnalysisParams params;
+  params.free = sound::TimeSpan{kEnd_s - 10 * kHop_s, kEnd_s};
+  const SoundAnalysis analysis = analyse(recording, params);
+  ASSERT_TRUE(analysis.difference);
+  // Noise less itself keeps -4.3 dB in the transform, and up to 3 dB less in time. With the loud sound in the mean,
+  // nothing of it would be left.
+  const auto part = [](const std::vector<float>& samples) { return std::span(samples).subspan(4410, 8820); };
+  EXPECT_GT(sound::rms_db(part(analysis.difference->samples)), sound::rms_db(part(analysis.samples)) - 9);
+}
+
+TEST(SoundAnalysis, SilenceIsDarkAndSaysThatNoDrillWasHeard) {
+  const SoundAnalysis silence =
+      analyse({.rate_hz = kAnalysisRate_hz, .channels = 2, .samples = std::vector<float>(22050, 0.0F)}, {});
+  const std::string text = to_text(silence);
+  EXPECT_THAT(text, testing::HasSubstr("no drill was heard; is it the right --channel?"));
+  EXPECT_EQ(silence.states.front().level_db, silence.level_db);
+  EXPECT_FALSE(silence.difference);
+  const std::vector<NamedPicture> pictures = pictures_of(silence, {});
+  const auto spectrogram = std::ranges::find(pictures, "spectrogram.png", &NamedPicture::file);
+  ASSERT_NE(spectrogram, pictures.end());
+  EXPECT_EQ(spectrogram->picture.at(600, 200), heat(0.0));
+  const SoundAnalysis drill = analyse({.rate_hz = kAnalysisRate_hz, .samples = noise_with(0.1, {}, 1.0)}, {});
+  EXPECT_THAT(to_text(drill), testing::Not(testing::HasSubstr("note")));
+}
+
+TEST(SoundAnalysis, NamesOfLinesBeyondTheAxisAreNotWritten) {
+  // At 6000 rpm the motor's mesh and commutation x2 and x3 are beyond 11025 Hz.
+  AnalysisParams fast, slow;
+  fast.spindle_rpm = 6000, slow.spindle_rpm = 1400;
+  const auto ink_at_the_right = [](const AnalysisParams& params) {
+    const SoundAnalysis analysis = analyse({.rate_hz = kAnalysisRate_hz, .samples = noise_with(0.1, {}, 1.0)}, params);
+    const std::vector<NamedPicture> pictures = pictures_of(analysis, {});
+    const auto psd = std::ranges::find(pictures, "psd.png", &NamedPicture::file);
+    int pixels = 0;
+    for (int y = 24; y < 370; ++y)
+      for (int x = 1045; x < 1084; ++x) pixels += psd->picture.at(x, y) == picture::Colour{120, 90, 40};
+    return pixels;
+  };
+  EXPECT_EQ(ink_at_the_right(slow), 0);
+  EXPECT_EQ(ink_at_the_right(fast), 0);
+}
+
+// A PNG file, row by row.
+struct Png {
   int width = 0, height = 0;
-  std::set<std::uint32_t> colours;
+  std::vector<std::uint8_t> pixels;
+
+  [[nodiscard]] picture::Colour at(int x, int y) const {
+    const auto i = 3 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x));
+    return {pixels[i], pixels[i + 1], pixels[i + 2]};
+  }
+  [[nodiscard]] int count(const picture::Colour& colour) const {
+    int found = 0;
+    for (int y = 0; y < height; ++y)
+      for (int x = 0; x < width; ++x) found += at(x, y) == colour;
+    return found;
+  }
 };
 
-PngFacts png_facts(const fs::path& file) {
-  PngFacts facts;
+Png png_of(const fs::path& file) {
+  Png png;
   png_image image{};
   image.version = PNG_IMAGE_VERSION;
-  if (png_image_begin_read_from_file(&image, file.c_str()) == 0) return facts;
+  if (png_image_begin_read_from_file(&image, file.c_str()) == 0) return png;
   image.format = PNG_FORMAT_RGB;
-  std::vector<std::uint8_t> pixels(PNG_IMAGE_SIZE(image));
-  if (png_image_finish_read(&image, nullptr, pixels.data(), 0, nullptr) == 0) return facts;
-  facts.width = static_cast<int>(image.width), facts.height = static_cast<int>(image.height);
-  for (std::size_t i = 0; i + 2 < pixels.size(); i += 3)
-    facts.colours.insert(static_cast<std::uint32_t>(pixels[i]) << 16U |
-                         static_cast<std::uint32_t>(pixels[i + 1]) << 8U | pixels[i + 2]);
-  return facts;
+  png.pixels.resize(PNG_IMAGE_SIZE(image));
+  if (png_image_finish_read(&image, nullptr, png.pixels.data(), 0, nullptr) == 0) return png;
+  png.width = static_cast<int>(image.width), png.height = static_cast<int>(image.height);
+  return png;
 }
+
+// How bright a colour of heat() is.
+int brightness(const picture::Colour& colour) { return colour.red + colour.green + colour.blue; }
 
 class AnalyseProgram : public testing::Test {
  protected:
@@ -183,6 +285,13 @@ class AnalyseProgram : public testing::Test {
     arguments.insert(arguments.begin(), "analyse");
     return test::run(test::program("osteon-audio"), arguments);
   }
+  // "out", with a displacement.
+  void make_folder() const {
+    std::ofstream(temp_ / "depth.csv") << "time_s,phase,depth_mm\n1,free,0\n4,bone,3\n10,bone,21.5\n";
+    const test::RunResult made = analyse_with({wav().string(), "--out", (temp_ / "out").string(), "--displacement",
+                                               (temp_ / "depth.csv").string(), "--full-scale-pa", "20"});
+    ASSERT_EQ(made.exit_code, 0) << made.err;
+  }
 
   test::TempDir temp_;
   double seconds_ = 0;
@@ -196,21 +305,11 @@ std::vector<std::string> lines_of(const std::string& text) {
 }
 
 TEST_F(AnalyseProgram, WritesAFolderOfTablesAndPictures) {
-  std::ofstream(temp_ / "depth.csv") << "time_s,phase,depth_mm\n1,free,0\n4,bone,3\n10,bone,21.5\n";
-  const test::RunResult made = analyse_with({wav().string(), "--out", (temp_ / "out").string(), "--displacement",
-                                             (temp_ / "depth.csv").string(), "--full-scale-pa", "20"});
-  ASSERT_EQ(made.exit_code, 0) << made.err;
+  ASSERT_NO_FATAL_FAILURE(make_folder());
   EXPECT_EQ(test::names_in(temp_ / "out"),
             (std::set<std::string>{"analysis.json", "bands.csv", "bands.png", "difference.png", "difference.wav",
                                    "gears.csv", "packets.csv", "packets.png", "psd.csv", "psd.png", "spectrogram.csv",
                                    "spectrogram.png", "states.csv", "waveform.png"}));
-  for (const char* picture : {"bands", "difference", "packets", "psd", "spectrogram", "waveform"}) {
-    const PngFacts facts = png_facts(temp_ / "out" / (std::string(picture) + ".png"));
-    EXPECT_EQ(facts.width, 1100) << picture;
-    EXPECT_GE(facts.height, 300) << picture;
-    EXPECT_GE(facts.colours.size(), 4U) << picture;
-  }
-
   const auto report = nlohmann::json::parse(test::content(temp_ / "out/analysis.json"));
   EXPECT_EQ(report["recording"]["sample_rate_hz"], 48000);
   EXPECT_NEAR(report["recording"]["seconds"], seconds_, 0.001);
@@ -222,6 +321,7 @@ TEST_F(AnalyseProgram, WritesAFolderOfTablesAndPictures) {
     }
   // 20 Pa re 20 uPa is 120 dB.
   const auto& level = report["recording"]["level"];
+  EXPECT_EQ(report["recording"]["format"], "integer");
   EXPECT_NEAR(level["db_spl"].get<double>() - level["db_full_scale"].get<double>(), 120.0, 0.002);
   // Each level's shares sum to 1.
   double sum = 0;
@@ -248,6 +348,64 @@ TEST_F(AnalyseProgram, WritesAFolderOfTablesAndPictures) {
   EXPECT_THAT(again.err, testing::HasSubstr("already there"));
 }
 
+TEST_F(AnalyseProgram, ThePicturesShowTheirCurves) {
+  ASSERT_NO_FATAL_FAILURE(make_folder());
+  for (const char* picture : {"bands", "difference", "packets", "psd", "spectrogram", "waveform"}) {
+    const Png png = png_of(temp_ / "out" / (std::string(picture) + ".png"));
+    EXPECT_EQ(png.width, 1100) << picture;
+    EXPECT_GE(png.height, 300) << picture;
+  }
+  // Each curve is there: the signal over time, in twelve bands, and the densities of two states.
+  constexpr picture::Colour kSignal{74, 111, 165}, kFree{0, 114, 178}, kCortical{213, 94, 0}, kDepth{200, 85, 61};
+  EXPECT_GT(png_of(temp_ / "out/waveform.png").count(kSignal), 5000);
+  EXPECT_GT(png_of(temp_ / "out/bands.png").count(kSignal), 12 * 2000);
+  EXPECT_GT(png_of(temp_ / "out/bands.png").count(kDepth), 13 * 500);
+  EXPECT_GT(png_of(temp_ / "out/packets.png").count(kSignal), 2000);
+  EXPECT_GT(png_of(temp_ / "out/psd.png").count(kFree), 1000);
+  EXPECT_GT(png_of(temp_ / "out/psd.png").count(kCortical), 1000);
+  EXPECT_GT(png_of(temp_ / "out/difference.png").count(kSignal), 2000);
+  EXPECT_GT(png_of(temp_ / "out/difference.png").count(kCortical), 1000);
+
+  // Where the spectrogram shows the motor's third harmonic, it is bright while the drill runs, and dark before.
+  const Png spectrogram = png_of(temp_ / "out/spectrogram.png");
+  const auto at_motor = [&](double time_s) {
+    int brightest = 0;
+    for (int y = -6; y <= 6; ++y)
+      brightest =
+          std::max(brightest, brightness(spectrogram.at(64 + static_cast<int>(1020 * time_s / seconds_),
+                                                        24 + static_cast<int>(346 * (1 - 5353.0 / 11025)) + y)));
+    return brightest;
+  };
+  const auto report = nlohmann::json::parse(test::content(temp_ / "out/analysis.json"));
+  const auto& states = report["states"];
+  const auto middle_of = [&](std::string_view state) {
+    for (const auto& span : states)
+      if (span["state"] == state) return 0.5 * (span["from_s"].get<double>() + span["to_s"].get<double>());
+    return -1.0;
+  };
+  EXPECT_GT(at_motor(middle_of("cortical")), at_motor(middle_of("before")) + 150);
+}
+
+TEST_F(AnalyseProgram, TheTableOfGearsHasThePeaks) {
+  ASSERT_NO_FATAL_FAILURE(make_folder());
+  const auto report = nlohmann::json::parse(test::content(temp_ / "out/analysis.json"));
+  const std::vector<std::string> gears = lines_of(test::content(temp_ / "out/gears.csv"));
+  ASSERT_EQ(gears.size(), report["gear_lines"].size() + 1);
+  int found = 0;
+  for (std::size_t i = 0; i + 1 < gears.size(); ++i) {
+    const auto& line = report["gear_lines"][i];
+    std::istringstream row(gears[i + 1]);
+    std::vector<std::string> fields;
+    for (std::string field; std::getline(row, field, ',');) fields.push_back(field);
+    ASSERT_EQ(fields.size() > 3, line.contains("found")) << gears[i + 1];
+    if (fields.size() <= 3) continue;
+    ++found;
+    EXPECT_NEAR(std::stod(fields[3]), line["found"]["hz"].get<double>(), 0.002);
+    EXPECT_NEAR(std::stod(fields[3]), line["hz"].get<double>(), std::max(11.0, 0.031 * line["hz"].get<double>()));
+  }
+  EXPECT_GE(found, 3);
+}
+
 TEST_F(AnalyseProgram, TheSameRecordingHasTheSameFiles) {
   for (const char* folder : {"one", "two"})
     ASSERT_EQ(analyse_with({wav().string(), "--out", (temp_ / folder).string()}).exit_code, 0);
@@ -263,6 +421,43 @@ TEST_F(AnalyseProgram, WithoutAFolderItOnlySays) {
   EXPECT_EQ(said.err, "");
 }
 
+TEST_F(AnalyseProgram, APartHasItsOwnTimes) {
+  // A table whose first bytes are the mark that a spreadsheet writes.
+  std::ofstream(temp_ / "depth.csv") << "\xEF\xBB\xBFtime_s,displacement_mm\n100,0\n120,20\n";
+  const test::RunResult made =
+      analyse_with({wav().string(), "--from", "2", "--to", "8.5", "--out", (temp_ / "out").string(), "--displacement",
+                    (temp_ / "depth.csv").string(), "--displacement-start", "101"});
+  ASSERT_EQ(made.exit_code, 0) << made.err;
+  EXPECT_THAT(made.out, testing::HasSubstr("part       from 2.000 s of"));
+  const auto report = nlohmann::json::parse(test::content(temp_ / "out/analysis.json"));
+  EXPECT_EQ(report["recording"]["from_s"], 2.0);
+  EXPECT_NEAR(report["recording"]["file_s"], seconds_, 0.001);
+  EXPECT_EQ(report["recording"]["seconds"], 6.5);
+  EXPECT_EQ(report["states"].back()["to_s"], 6.5);
+  // The part begins in the table's second 101, at 1 mm.
+  const std::vector<std::string> bands = lines_of(test::content(temp_ / "out/bands.csv"));
+  const double mm = std::stod(bands[1].substr(bands[1].find(',') + 1));
+  EXPECT_NEAR(mm, 1.0, 0.02);
+}
+
+TEST_F(AnalyseProgram, WhatIsThereOfACutRecordingIsAnalysed) {
+  const std::string whole = test::content(wav());
+  const auto said = [&](std::string changed) {
+    std::ofstream(temp_ / "changed.wav", std::ios::binary) << changed;
+    const test::RunResult result = analyse_with({(temp_ / "changed.wav").string()});
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    return result.out;
+  };
+  EXPECT_THAT(said(whole.substr(0, 44 + 2 * 48000 * 5)),
+              testing::ContainsRegex("the header announces .* s; 5 s are there"));
+  std::string streamed = whole, coarse = whole;
+  streamed.replace(40, 4, std::string(4, '\xFF'));
+  EXPECT_THAT(said(streamed), testing::HasSubstr("the header gives no length"));
+  coarse[34] = 8, coarse[32] = 1;  // BitsPerSample, BlockAlign
+  EXPECT_THAT(said(coarse), testing::HasSubstr("8 bits: their quantisation noise"));
+  EXPECT_THAT(said(whole), testing::Not(testing::HasSubstr("note")));
+}
+
 TEST_F(AnalyseProgram, WrongUseIsOneSentenceEach) {
   const auto put = [&](const char* name, std::string_view text) {
     std::ofstream(temp_ / name, std::ios::binary) << text;
@@ -270,10 +465,10 @@ TEST_F(AnalyseProgram, WrongUseIsOneSentenceEach) {
   };
   const std::string whole = test::content(wav());
   const std::string drilling = wav().string();
-  std::string stereo = whole, coarse = whole, fast = whole;
-  stereo[22] = 2, stereo[32] = 4;               // NumChannels, BlockAlign
-  coarse[34] = 8, coarse[32] = 1;               // BitsPerSample, BlockAlign
-  fast[24] = 0, fast[25] = 0x77, fast[26] = 1;  // SampleRate 96000
+  std::string stereo = whole, slow = whole;
+  stereo[22] = 2, stereo[32] = 4;                  // NumChannels, BlockAlign
+  slow[24] = 0x40, slow[25] = 0x1F, slow[26] = 0;  // SampleRate 8000
+  const std::string table = put("late.csv", "time_s,depth_mm\n100,2\n110,3\n");
   struct Wrong {
     std::vector<std::string> arguments;
     std::vector<std::string> says;
@@ -283,10 +478,9 @@ TEST_F(AnalyseProgram, WrongUseIsOneSentenceEach) {
       {{}, {"FILE"}},
       {{put("text.wav", "no sound at all\n")}, {"text.wav", "no WAV file", "convert"}},
       {{put("empty.wav", "")}, {"empty.wav", "empty"}},
-      {{put("cut.wav", whole.substr(0, whole.size() / 2))}, {"cut.wav", "truncated", "again"}},
+      {{put("cut.wav", whole.substr(0, 40))}, {"cut.wav", "truncated", "again"}},
       {{put("stereo.wav", stereo)}, {"stereo.wav", "NumChannels is 2", "--channel"}},
-      {{put("coarse.wav", coarse)}, {"coarse.wav", "BitsPerSample is 8", "16 bits"}},
-      {{put("fast.wav", fast)}, {"fast.wav", "SampleRate is 96000", "44100"}},
+      {{put("slow.wav", slow)}, {"slow.wav", "SampleRate is 8000", "44100"}},
       {{temp_.path().string()}, {"folder"}},
       {{drilling, "--out", "/proc/nowhere/out"}, {"/proc/nowhere/out", "may write"}},
       {{drilling, "--out", drilling}, {"drilling.wav", "already there"}},
@@ -295,14 +489,28 @@ TEST_F(AnalyseProgram, WrongUseIsOneSentenceEach) {
       {{drilling, "--free", "3", "2"}, {"--free", "drilling.wav"}},
       {{drilling, "--free", "3"}, {"--free"}},
       {{drilling, "--full-scale-pa", "-1"}, {"--full-scale-pa"}},
-      {{drilling, "--displacement", "no.csv"}, {"no.csv", "time_s"}},
-      {{drilling, "--displacement", put("a.csv", "time,depth_mm\n1,2\n")}, {"a.csv", "line 1", "time_s"}},
-      {{drilling, "--displacement", put("b.csv", "time_s,x\n1,2\n")}, {"b.csv", "line 1", "displacement_mm"}},
-      {{drilling, "--displacement", put("c.csv", "time_s,depth_mm\n1,2\n2,far\n")}, {"c.csv", "line 3", "depth_mm"}},
-      {{drilling, "--displacement", put("d.csv", "time_s,depth_mm\n1,2\n0,3\n")}, {"d.csv", "line 3", "sort"}},
-      {{drilling, "--displacement", put("e.csv", "time_s,depth_mm\n1\n")}, {"e.csv", "line 2", "depth_mm"}},
-      {{drilling, "--displacement", put("f.csv", "time_s,depth_mm\n")}, {"f.csv", "no row"}},
-      {{drilling, "--displacement", put("g.csv", "")}, {"g.csv", "time_s"}},
+      {{drilling, "--channel", "2"}, {"drilling.wav", "NumChannels is 1", "channel 2"}},
+      {{drilling, "--from", "1000"}, {"drilling.wav", "--from"}},
+      {{drilling, "--from", "3", "--to", "3.1"}, {"drilling.wav", "the part lasts 0.1 s"}},
+      {{drilling, "--displacement", table}, {"--displacement", "--out"}},
+      {{drilling, "--displacement-start", "1"}, {"--displacement-start", "--displacement"}},
+      {{drilling, "--out", (temp_ / "out").string(), "--displacement", table},
+       {"late.csv", "100 to 110 s", "--displacement-start"}},
+      {{drilling, "--out", (temp_ / "out").string(), "--displacement", temp_.path().string()}, {"folder"}},
+      {{drilling, "--out", (temp_ / "out").string(), "--displacement", "no.csv"}, {"no.csv", "time_s"}},
+      {{drilling, "--out", (temp_ / "out").string(), "--displacement", put("a.csv", "time,depth_mm\n1,2\n")},
+       {"a.csv", "line 1", "time_s"}},
+      {{drilling, "--out", (temp_ / "out").string(), "--displacement", put("b.csv", "time_s,x\n1,2\n")},
+       {"b.csv", "line 1", "displacement_mm"}},
+      {{drilling, "--out", (temp_ / "out").string(), "--displacement", put("c.csv", "time_s,depth_mm\n1,2\n2,far\n")},
+       {"c.csv", "line 3", "depth_mm"}},
+      {{drilling, "--out", (temp_ / "out").string(), "--displacement", put("d.csv", "time_s,depth_mm\n1,2\n0,3\n")},
+       {"d.csv", "line 3", "sort"}},
+      {{drilling, "--out", (temp_ / "out").string(), "--displacement", put("e.csv", "time_s,depth_mm\n1\n")},
+       {"e.csv", "line 2", "depth_mm"}},
+      {{drilling, "--out", (temp_ / "out").string(), "--displacement", put("f.csv", "time_s,depth_mm\n")},
+       {"f.csv", "no row"}},
+      {{drilling, "--out", (temp_ / "out").string(), "--displacement", put("g.csv", "")}, {"g.csv", "time_s"}},
   };
   for (const Wrong& wrong : cases) {
     const test::RunResult result = analyse_with(wrong.arguments);

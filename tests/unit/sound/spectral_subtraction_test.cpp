@@ -48,8 +48,8 @@ TEST(SpectralSubtraction, AToneInNoiseBecomesClearer) {
   const double before_db = 10.0 * std::log10(energy(clean) / energy(other));
   const double after_db = 10.0 * std::log10(energy(clean) / energy(differences(result, clean)));
   // The transform keeps exp(-1) of the noise, which is 4.34 dB. The transform has twice as many values as the
-  // signal, and overlap-add is a projection: of errors that were independent it would keep half, 3 dB less. Neighbouring
-  // frames are correlated a little, so it keeps more.
+  // signal, and overlap-add is a projection: of errors that were independent it would keep half, 3 dB less.
+  // Neighbouring frames are correlated a little, so it keeps more.
   EXPECT_GT(after_db - before_db, 4.34);
   EXPECT_LT(after_db - before_db, 4.34 + 3.01);
   EXPECT_NEAR(tone_db(result, kAnalysed_hz, 3000), 20.0 * std::log10(0.1), 0.1);
