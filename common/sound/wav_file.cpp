@@ -217,16 +217,17 @@ std::optional<float> sample_of(std::span<const float> frame, std::optional<Chann
 // In blocks, so that an hour with many channels takes no more memory than the part of one that is kept.
 Result<std::vector<float>> read_samples(const fs::path& file, SNDFILE* in, const SF_INFO& info, const FrameRange& range,
                                         std::optional<Channel> channel) {
-  constexpr std::size_t kBlock = 65536;  // frames
+  constexpr std::size_t kBlock = 65536;  // samples of all channels
   // More is no sound, but numbers for something else, and their squares would overflow.
   constexpr float kMost = 1e6F;
   const auto channels = static_cast<std::size_t>(info.channels);
-  std::vector<float> samples, block(kBlock * channels);
+  const std::size_t frames = kBlock / channels;
+  std::vector<float> samples, block(frames * channels);
   samples.reserve(static_cast<std::size_t>(range.count));
   if (sf_seek(in, range.first, SEEK_SET) != range.first)
     return bad_input(file.string() + " is truncated: --from is behind its end; copy it again");
   while (std::ssize(samples) < range.count) {
-    const auto wanted = std::min<sf_count_t>(kBlock, range.count - std::ssize(samples));
+    const auto wanted = std::min(static_cast<sf_count_t>(frames), range.count - std::ssize(samples));
     const sf_count_t got = sf_readf_float(in, block.data(), wanted);
     for (std::size_t i = 0; std::cmp_less(i, got); ++i) {
       const auto x = sample_of(std::span(block).subspan(i * channels, channels), channel);

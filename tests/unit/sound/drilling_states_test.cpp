@@ -110,7 +110,7 @@ std::vector<Scene> one_bone(DrillingState state, double seconds, double noise_db
 TEST(DrillingStates, BeyondTheRateOfTheRecordingNoLineDecides) {
   // At 3500 rpm the motor's third harmonic is at 13382 Hz, and its mesh at 10037 Hz. The mesh alone proves nothing.
   const std::vector<Scene> scenes = one_bone(DrillingState::cortical, 1.5, -30, -200, -200);
-  const auto found = drilling_states(played(scenes, 9), kAnalysed_hz, {.spindle_rpm = 3500});
+  const auto found = drilling_states(played(scenes, 9), kAnalysed_hz, {.spindle_rpm = 3500, .free = {}});
   SCOPED_TRACE(words(found));
   expect_states(found, scenes);
 }
