@@ -12,16 +12,17 @@
 #include "audio_client/analysis/analysis.hpp"
 #include "audio_client/analysis/analysis_report.hpp"
 #include "audio_client/analysis/displacement_file.hpp"
-#include "common/core/bounded_text.hpp"
+#include "audio_client/app/recording_option.hpp"
 
 namespace osteon::audio {
 namespace {
 
 struct AnalyseArguments {
-  std::string file, channel, displacement, out;
+  RecordingOption recording;
+  std::string displacement, out;
   std::vector<double> free_s;
-  double spindle_rpm = 1400, displacement_start_s = 0, from_s = 0;
-  std::optional<double> to_s, full_scale_pa;
+  double spindle_rpm = 1400, displacement_start_s = 0;
+  std::optional<double> full_scale_pa;
 };
 
 std::string shown(double value) {
@@ -34,7 +35,7 @@ Result<std::optional<sound::TimeSpan>> free_span(const AnalyseArguments& a, doub
   if (a.free_s.empty()) return std::optional<sound::TimeSpan>();
   const sound::TimeSpan span{a.free_s[0], a.free_s[1]};
   if (span.from_s < 0 || span.to_s > seconds || span.to_s - span.from_s < 0.1)
-    return bad_input("--free must be two times within the " + shown(seconds) + " s of " + a.file +
+    return bad_input("--free must be two times within the " + shown(seconds) + " s of " + a.recording.file +
                      ", the second at least 0.1 s after the first");
   return std::optional(span);
 }
@@ -56,11 +57,7 @@ Result<std::string> run_analysis(const AnalyseArguments& a) {
   std::error_code ignored;
   if (!a.out.empty() && std::filesystem::exists(a.out, ignored))
     return failure(ErrorCode::exists, a.out + " is already there; give --out another name or remove it first");
-  sound::WavPart part{.channel = {}, .from_s = a.from_s, .to_s = a.to_s};
-  if (!a.channel.empty() && !(part.channel = sound::channel_of(a.channel)))
-    return bad_input("--channel must be left, right, mean or a number from 1 to " +
-                     std::to_string(sound::kMostChannels) + ", not " + bounded_text(a.channel, 40));
-  const auto recording = sound::read_wav(a.file, part);
+  const auto recording = read(a.recording);
   if (!recording) return tl::unexpected(recording.error());
   const auto free = free_span(a, recording->seconds());
   if (!free) return tl::unexpected(free.error());
@@ -91,20 +88,11 @@ void add_analyse_command(CLI::App& app, std::function<Result<std::string>()>& ch
   AnalyseArguments& a = *shared;
   CLI::App* command = app.add_subcommand(
       "analyse", "Analyse a recorded drilling: its states, spectra, wavelet packets, and the lines of the gears");
-  command->add_option("FILE", a.file, "WAV or RF64, PCM or float, 22050 to 384000 Hz, 0.25 s to 5 minutes")->required();
+  add_recording(*command, a.recording);
   CLI::Option* out =
       command->add_option("--out", a.out,
                           "Folder, made by this command: analysis.json, tables (psd.csv, spectrogram.csv, packets.csv, "
                           "states.csv, gears.csv, bands.csv), pictures, and the sound difference (difference.wav)");
-  command->add_option("--channel", a.channel, "Of several that differ: left, right, mean, or its number from 1 on");
-  command->add_option("--from", a.from_s, "Seconds of the recording at which the part begins that is analysed")
-      ->check(CLI::Range(0.0, 1e6))
-      ->capture_default_str();
-  command
-      ->add_option("--to", a.to_s,
-                   "Seconds of the recording at which it ends; by default, the recording's end. All "
-                   "other times count from --from")
-      ->check(CLI::Range(0.0, 1e6));
   command
       ->add_option("--rpm", a.spindle_rpm,
                    "Speed of the spindle, which says where the lines of the gears are; they are those of "

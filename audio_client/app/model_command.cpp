@@ -4,17 +4,18 @@
 
 #include <cstdint>
 #include <memory>
-#include <optional>
 
 #include "audio_client/analysis/analysis.hpp"
 #include "audio_client/analysis/model_report.hpp"
+#include "audio_client/app/recording_option.hpp"
 #include "common/runtime/files.hpp"
 
 namespace osteon::audio {
 namespace {
 
 struct ModelArguments {
-  std::string file, channel, out, play;
+  RecordingOption recording;
+  std::string out, play;
   int refinements = 2;
   std::uint64_t seed = 1;
 };
@@ -23,9 +24,7 @@ Result<std::string> run_model(const ModelArguments& a) {
   // What would be found after the work is found before it.
   if (auto usable = check_writable(a.out, "the model", "--out"); !usable) return tl::unexpected(usable.error());
   if (auto usable = check_writable(a.play, "the sound", "--play"); !usable) return tl::unexpected(usable.error());
-  std::optional<sound::Channel> channel;
-  if (!a.channel.empty()) channel = sound::channel_of(a.channel);
-  const auto recording = sound::read_wav(a.file, channel);
+  const auto recording = read(a.recording);
   if (!recording) return tl::unexpected(recording.error());
   const ModelReport report = model_report(*recording, a.refinements, a.seed);
   std::string text = to_text(report);
@@ -62,12 +61,9 @@ void add_model_commands(CLI::App& app, std::function<Result<std::string>()>& cho
   const auto model = std::make_shared<ModelArguments>();
   CLI::App* command = app.add_subcommand(
       "model", "Model a recording by partials, noise and impacts, and print how near the model's sound comes to it");
-  command->add_option("FILE", model->file, "PCM WAV of 16, 24 or 32 bits, 22050 to 48000 Hz, 0.25 s to 5 minutes")
-      ->required();
+  add_recording(*command, model->recording);
   command->add_option("--out", model->out, "File for the model");
   command->add_option("--play", model->play, "WAV file for the sound of the model");
-  command->add_option("--channel", model->channel, "Of a stereo recording: left, right or mean")
-      ->check(CLI::IsMember({"left", "right", "mean"}));
   command
       ->add_option("--refine", model->refinements,
                    "Rounds in which each peak is estimated again without the others; 0 is the fastest")

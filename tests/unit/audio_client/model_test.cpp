@@ -64,6 +64,14 @@ TEST_F(ModelProgram, ItsFileSoundsAsWhatItPlays) {
   EXPECT_EQ(model->samples, sound->samples.size());
 }
 
+TEST_F(ModelProgram, ModelsThePartThatIsAskedFor) {
+  const test::RunResult part = run({"model", wav().string(), "--from", "0.5", "--to", "1.75", "--play", path("a.wav")});
+  ASSERT_EQ(part.exit_code, 0) << part.err;
+  const auto sound = sound::read_wav(temp_ / "a.wav");
+  ASSERT_TRUE(sound) << sound.error().message;
+  EXPECT_NEAR(sound->seconds(), 1.25, 0.001);
+}
+
 TEST_F(ModelProgram, WrongUseIsOneSentenceEach) {
   ASSERT_EQ(run({"model", wav().string(), "--out", path("a.model")}).exit_code, 0);
   const std::string whole = test::content(temp_ / "a.model");
@@ -85,6 +93,8 @@ TEST_F(ModelProgram, WrongUseIsOneSentenceEach) {
       {{"model"}, {"FILE"}},
       {{"model", path("a.model")}, {"a.model", "no WAV file"}},
       {{"model", wav().string(), "--refine", "-1"}, {"--refine"}},
+      {{"model", wav().string(), "--channel", "middle"}, {"--channel", "middle"}},
+      {{"model", wav().string(), "--from", "1.9"}, {"drill.wav", "the part lasts 0.1 s"}},
       {{"model", wav().string(), "--out", "/proc/nowhere/a.model"}, {"/proc/nowhere/a.model", "--out"}},
       {{"model", wav().string(), "--play", "/proc/nowhere/a.wav"}, {"/proc/nowhere/a.wav", "--play"}},
       {{"resynthesise", path("a.model")}, {"OUT"}},

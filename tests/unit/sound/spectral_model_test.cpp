@@ -112,7 +112,7 @@ class Recordings : public testing::TestWithParam<Required> {};
 TEST_P(Recordings, AreResembledAsRequired) {
   const auto shared = test::find_shared();
   if (!shared) GTEST_SKIP() << "SKIPPED: no recordings: the folder shared/ is not beside the checkout";
-  const auto recording = read_wav(*shared / "data/sound" / GetParam().file, Channel::left);
+  const auto recording = read_wav(*shared / "data/sound" / GetParam().file, {.channel = Channel::left});
   ASSERT_TRUE(recording) << recording.error().message;
   const std::vector<float> samples = resampled(recording->samples, recording->rate_hz, kAnalysed_hz);
   for (const int refinements : {0, 2}) {
