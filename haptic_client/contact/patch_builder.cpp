@@ -50,6 +50,7 @@ void PatchBuilder::changed(double pitch_mm, int level, const std::vector<Coord>&
     const auto forget = [&](Store& store, int of_level) {
       if (store.empty()) return;
       // Finer samples are interpolated up to the next leaf. They lie in bricks that hold samples of this one too.
+      static_assert(1 << (kLevels - 1) <= kBrickCells);
       const Box box{position_mm(origin, leaf_pitch),
                     position_mm(origin + Coord{kLeafSize - 1, kLeafSize - 1, kLeafSize - 1}, leaf_pitch)};
       const double pitch = level_pitch_mm(pitch_mm, of_level);

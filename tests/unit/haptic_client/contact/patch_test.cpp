@@ -3,7 +3,10 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <random>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "tests/support/scenes/random_cuts.hpp"
@@ -123,6 +126,70 @@ TEST(Patch, FollowsCutsOfEveryLevelInEverySample) {
     }
     EXPECT_GT(compared, 10) << level;
   }
+}
+
+// Whether one of a brick's samples depends on a leaf: it is one of its samples, or lies between two samples of the
+// leaf's level, of which one is the leaf's. Counted along one axis in pitches of the finest level.
+bool depends(int brick, int of_level, int leaf_origin, int leaf_level) {
+  const int step = 1 << (kLevels - 1 - of_level), leaf_step = 1 << (kLevels - 1 - leaf_level);
+  const int reach = step < leaf_step ? leaf_step : 1;
+  const int after = leaf_origin * leaf_step - reach, before = (leaf_origin + kLeafSize - 1) * leaf_step + reach;
+  for (int i = 0; i < kBrickSamples; ++i) {
+    const int sample = (brick * kBrickCells + i) * step;
+    if (after < sample && sample < before) return true;
+  }
+  return false;
+}
+
+// How many bricks were made anew. Bricks without bone share one, which no leaf changes.
+int check_made_anew(const BrickGrid& before, const BrickGrid& after, int of_level, Coord leaf, int leaf_level) {
+  int anew = 0, i = 0;
+  for (int x = 0; x < after.dims().x; ++x)
+    for (int y = 0; y < after.dims().y; ++y)
+      for (int z = 0; z < after.dims().z; ++z, ++i) {
+        const float* const brick = after.tables()[i];
+        if (brick == nullptr) continue;
+        const Coord at = after.first() + Coord{x, y, z};
+        const bool expected = depends(at.x, of_level, leaf.x, leaf_level) &&
+                              depends(at.y, of_level, leaf.y, leaf_level) &&
+                              depends(at.z, of_level, leaf.z, leaf_level);
+        const bool made = brick != before.tables()[i];
+        const bool alike = std::all_of(brick, brick + kBrickSamples * kBrickSamples * kBrickSamples,
+                                       [&](float value) { return value == *brick; });
+        if (!expected || !alike) EXPECT_EQ(made, expected) << "brick " << at.x << " " << at.y << " " << at.z;
+        anew += made;
+      }
+  return anew;
+}
+
+// No brick that depends on a changed leaf is kept, and no other is made anew.
+TEST(Patch, MakesOnlyTheBricksOfAChangedLeafAnew) {
+  const Case bone = osteon::test::ball_of_bone();
+  const Pose pose{{0, 0, -9.0}, Eigen::Quaterniond::Identity()};
+  const CutField field(bone, BodyId{});
+  for (int level = 0; level < kLevels; ++level)
+    for (int leaf_level = 0; leaf_level < kLevels; ++leaf_level) {
+      SCOPED_TRACE("tool of level " + std::to_string(level) + ", leaf of level " + std::to_string(leaf_level));
+      Tool tool = *find_tool("burr-round-5");
+      tool.cut_level = level;
+      const ToolModel model(tool, bone.pitch_mm());
+      PatchBuilder builder;
+      Patch before, after;
+      builder.build(field, model, pose, before);
+      int anew = 0;
+      for (const Vec3& place :
+           {Vec3(0.3, 0.4, -9.2), Vec3(-1.1, 0.7, -8.0), Vec3(1.9, -1.3, -9.9), Vec3(0.1, 2.2, -8.6)}) {
+        const Vec3 leaf = (place / (kLeafSize * level_pitch_mm(bone.pitch_mm(), leaf_level))).array().floor();
+        const Coord origin{kLeafSize * static_cast<int>(leaf.x()), kLeafSize * static_cast<int>(leaf.y()),
+                           kLeafSize * static_cast<int>(leaf.z())};
+        builder.changed(bone.pitch_mm(), leaf_level, {origin});
+        builder.build(field, model, pose, after);
+        anew += check_made_anew(before.fine, after.fine, level, origin, leaf_level);
+        anew += check_made_anew(before.coarse, after.coarse, 0, origin, leaf_level);
+        std::swap(before, after);
+      }
+      EXPECT_GT(anew, 10);
+    }
 }
 
 // Two bodies share the block. What is solid in either is solid. A body that goes takes its half with it.
