@@ -34,7 +34,7 @@ std::string shown(double value) {
 Result<std::optional<sound::TimeSpan>> free_span(const AnalyseArguments& a, double seconds) {
   if (a.free_s.empty()) return std::optional<sound::TimeSpan>();
   const sound::TimeSpan span{a.free_s[0], a.free_s[1]};
-  if (span.from_s < 0 || span.to_s > seconds || span.to_s - span.from_s < 0.1)
+  if (!(span.from_s >= 0 && span.to_s <= seconds && span.to_s - span.from_s >= 0.1))  // not true of nan
     return bad_input("--free must be two times within the " + shown(seconds) + " s of " + a.recording.file +
                      ", the second at least 0.1 s after the first");
   return std::optional(span);
@@ -97,7 +97,7 @@ void add_analyse_command(CLI::App& app, std::function<Result<std::string>()>& ch
       ->add_option("--rpm", a.spindle_rpm,
                    "Speed of the spindle, which says where the lines of the gears are; they are those of "
                    "the dissertation's drill")
-      ->check(CLI::Range(10.0, 100000.0))
+      ->check(number_in(10.0, 100000.0))
       ->capture_default_str();
   command
       ->add_option("--free", a.free_s,
@@ -112,12 +112,12 @@ void add_analyse_command(CLI::App& app, std::function<Result<std::string>()>& ch
       ->add_option("--displacement-start", a.displacement_start_s,
                    "Time in that table at which the recording begins, seconds")
       ->needs(displacement)
-      ->check(CLI::Range(-1e6, 1e6))
+      ->check(number_in(-1e6, 1e6))
       ->capture_default_str();
   command
       ->add_option("--full-scale-pa", a.full_scale_pa,
                    "Sound pressure of full scale, Pa, from a calibrated recording: also prints levels re 20 uPa")
-      ->check(CLI::Range(1e-6, 1e6));
+      ->check(number_in(1e-6, 1e6));
   command->callback([shared, &chosen] { chosen = [shared] { return run_analysis(*shared); }; });
 }
 

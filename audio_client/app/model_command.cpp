@@ -3,7 +3,10 @@
 #include <CLI/CLI.hpp>
 
 #include <cstdint>
+#include <filesystem>
 #include <memory>
+#include <string>
+#include <vector>
 
 #include "audio_client/analysis/analysis.hpp"
 #include "audio_client/analysis/model_report.hpp"
@@ -20,10 +23,27 @@ struct ModelArguments {
   std::uint64_t seed = 1;
 };
 
+// A file for an output, which is no other file of the same command.
+Result<void> check_output(const std::string& file, const std::string& what, const std::string& option,
+                          const std::vector<std::string>& others) {
+  if (file.empty()) return {};
+  std::error_code ignored;
+  if (std::filesystem::is_other(file, ignored))
+    return bad_input("cannot write " + what + " " + file + ": it is a device or a pipe; give " + option + " a file");
+  for (const std::string& other : others)
+    if (!other.empty() &&
+        std::filesystem::weakly_canonical(file, ignored) == std::filesystem::weakly_canonical(other, ignored))
+      return bad_input(file + " would lose " + (other == others.front() ? "what is read" : "the model") + "; give " +
+                       option + " another file");
+  return check_writable(file, what, option);
+}
+
 Result<std::string> run_model(const ModelArguments& a) {
   // What would be found after the work is found before it.
-  if (auto usable = check_writable(a.out, "the model", "--out"); !usable) return tl::unexpected(usable.error());
-  if (auto usable = check_writable(a.play, "the sound", "--play"); !usable) return tl::unexpected(usable.error());
+  if (auto usable = check_output(a.out, "the model", "--out", {a.recording.file}); !usable)
+    return tl::unexpected(usable.error());
+  if (auto usable = check_output(a.play, "the sound", "--play", {a.recording.file, a.out}); !usable)
+    return tl::unexpected(usable.error());
   const auto recording = read(a.recording);
   if (!recording) return tl::unexpected(recording.error());
   const ModelReport report = model_report(*recording, a.refinements, a.seed);
@@ -46,7 +66,7 @@ struct ResynthesiseArguments {
 };
 
 Result<std::string> run_resynthesis(const ResynthesiseArguments& a) {
-  if (auto usable = check_writable(a.out, "the sound", "OUT"); !usable) return tl::unexpected(usable.error());
+  if (auto usable = check_output(a.out, "the sound", "OUT", {a.model}); !usable) return tl::unexpected(usable.error());
   const auto model = read_model(a.model);
   if (!model) return tl::unexpected(model.error());
   const std::vector<float> sound = sound::resynthesised(*model, a.seed);

@@ -1,8 +1,20 @@
 #include "audio_client/app/recording_option.hpp"
 
+#include <cmath>
+#include <cstdlib>
+
 #include "common/core/bounded_text.hpp"
 
 namespace osteon::audio {
+
+CLI::Validator number_in(double least, double most) {
+  const CLI::Validator finite(
+      [](const std::string& text) {
+        return std::isfinite(std::strtod(text.c_str(), nullptr)) ? std::string() : text + " is no finite number";
+      },
+      "");
+  return finite & CLI::Range(least, most);
+}
 
 void add_recording(CLI::App& command, RecordingOption& recording) {
   command.add_option("FILE", recording.file, "WAV or RF64, PCM or float, 22050 to 384000 Hz, 0.25 s to 5 minutes")
@@ -12,12 +24,12 @@ void add_recording(CLI::App& command, RecordingOption& recording) {
   command
       .add_option("--from", recording.from_s,
                   "Seconds of the recording at which its part begins. All other times count from here")
-      ->check(CLI::Range(0.0, 1e6))
+      ->check(number_in(0.0, 1e6))
       ->capture_default_str();
   command
       .add_option("--to", recording.to_s,
                   "Seconds of the recording at which its part ends; by default, the recording's end")
-      ->check(CLI::Range(0.0, 1e6));
+      ->check(number_in(0.0, 1e6));
 }
 
 Result<sound::WavSound> read(const RecordingOption& recording) {

@@ -15,6 +15,9 @@ struct RecordingOption {
   std::optional<double> to_s;
 };
 
+// CLI::Range, which lets "nan" pass, for numbers.
+[[nodiscard]] CLI::Validator number_in(double least, double most);
+
 // Adds FILE, --channel, --from and --to. `recording` outlives `command`.
 void add_recording(CLI::App& command, RecordingOption& recording);
 

@@ -12,7 +12,13 @@
 namespace osteon {
 
 Result<void> write_file(const std::filesystem::path& file, std::string_view content) {
-  std::filesystem::path partial = file;
+  std::error_code none;
+  // A rename would replace a link, a device or a pipe by a file.
+  const std::filesystem::path target =
+      std::filesystem::is_symlink(file, none) ? std::filesystem::weakly_canonical(file, none) : file;
+  if (std::filesystem::is_other(target, none))
+    return failure(ErrorCode::internal, "cannot write " + file.string() + ": it is a device or a pipe; give a file");
+  std::filesystem::path partial = target;
   partial += ".partial-" + std::to_string(::getpid());
   const auto give_up = [&](const std::string& reason) -> Result<void> {
     std::error_code ignored;
@@ -26,7 +32,7 @@ Result<void> write_file(const std::filesystem::path& file, std::string_view cont
     if (!out) return give_up(std::strerror(errno));
   }
   std::error_code error;
-  std::filesystem::rename(partial, file, error);
+  std::filesystem::rename(partial, target, error);
   if (error) return give_up(error.message());
   return {};
 }

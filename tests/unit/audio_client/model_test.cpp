@@ -1,6 +1,7 @@
 // osteon-audio model and resynthesise: what they print and write, and what they say to wrong use.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include <algorithm>
 #include <cmath>
@@ -97,6 +98,16 @@ TEST_F(ModelProgram, WrongUseIsOneSentenceEach) {
       {{"model", wav().string(), "--from", "1.9"}, {"drill.wav", "the part lasts 0.1 s"}},
       {{"model", wav().string(), "--out", "/proc/nowhere/a.model"}, {"/proc/nowhere/a.model", "--out"}},
       {{"model", wav().string(), "--play", "/proc/nowhere/a.wav"}, {"/proc/nowhere/a.wav", "--play"}},
+      {{"model", wav().string(), "--from", "nan"}, {"--from", "nan is no finite number"}},
+      {{"model", wav().string(), "--to", "inf"}, {"--to", "inf is no finite number"}},
+      {{"model", wav().string(), "--out", wav().string()}, {"drill.wav would lose what is read", "--out another"}},
+      {{"model", wav().string(), "--play", path("./drill.wav")}, {"drill.wav would lose what is read", "--play"}},
+      {{"model", wav().string(), "--out", path("b"), "--play", path("./b")}, {"b would lose the model", "--play"}},
+      {{"model", wav().string(), "--out", path("pipe")}, {"pipe: it is a device or a pipe", "--out"}},
+      {{"resynthesise", path("a.model"), path("a.model")}, {"a.model would lose what is read", "OUT another"}},
+      {{"resynthesise", path("a.model"), path("pipe")}, {"pipe: it is a device or a pipe", "OUT"}},
+      {{"resynthesise", path("pipe"), path("b.wav")}, {"pipe is a folder, a device or a pipe"}},
+      {{"resynthesise", "/dev/zero", path("b.wav")}, {"/dev/zero is a folder, a device or a pipe"}},
       {{"resynthesise", path("a.model")}, {"OUT"}},
       {{"resynthesise", "nothing.model", path("b.wav")}, {"nothing.model"}},
       {{"resynthesise", path("folder"), path("b.wav")}, {"folder"}},
@@ -105,6 +116,8 @@ TEST_F(ModelProgram, WrongUseIsOneSentenceEach) {
       {{"resynthesise", put("cut.model", whole.substr(0, whole.size() / 2)), path("b.wav")}, {"cut.model", "damaged"}},
       {{"resynthesise", put("other.model", other), path("b.wav")}, {"other.model", "version is 9"}},
   };
+  ASSERT_EQ(::mkfifo(path("pipe").c_str(), 0600), 0);
+  const std::string recorded = test::content(wav());
   for (const Wrong& wrong : cases) {
     const test::RunResult result = run(wrong.arguments);
     EXPECT_EQ(result.exit_code, 1) << wrong.says.front();
@@ -112,6 +125,23 @@ TEST_F(ModelProgram, WrongUseIsOneSentenceEach) {
     for (const std::string& words : wrong.says) EXPECT_THAT(result.err, testing::HasSubstr(words));
     EXPECT_EQ(std::ranges::count(result.err, '\n'), 1) << result.err;
     EXPECT_EQ(result.out, "");
+  }
+  EXPECT_EQ(test::content(wav()), recorded);
+  EXPECT_EQ(test::content(temp_ / "a.model"), whole);
+  EXPECT_TRUE(fs::is_fifo(temp_ / "pipe"));
+}
+
+// What is read by another program may be a link to where it shall be.
+TEST_F(ModelProgram, WritesWhereALinkPoints) {
+  ASSERT_TRUE(fs::create_directory(temp_ / "elsewhere"));
+  for (const char* name : {"a.model", "a.wav"}) {
+    std::ofstream(temp_ / "elsewhere" / name) << "old";
+    fs::create_symlink(temp_ / "elsewhere" / name, temp_ / name);
+  }
+  ASSERT_EQ(run({"model", wav().string(), "--out", path("a.model"), "--play", path("a.wav")}).exit_code, 0);
+  for (const char* name : {"a.model", "a.wav"}) {
+    EXPECT_TRUE(fs::is_symlink(temp_ / name)) << name;
+    EXPECT_GT(fs::file_size(temp_ / "elsewhere" / name), 1000u) << name;
   }
 }
 
