@@ -19,7 +19,6 @@
 #include "common/sound/tones.hpp"
 #include "common/sound/wav_file.hpp"
 #include "tests/support/content.hpp"
-#include "tests/support/shared_data.hpp"
 #include "tests/support/temp_dir.hpp"
 #include "tests/unit/sound/signals.hpp"
 
@@ -289,18 +288,6 @@ TEST(WavFile, ChangedBytesOfTheHeaderDoNoHarm) {
     EXPECT_LE(read->samples.size(), 16000U);  // of 8 bits
     for (const float x : read->samples) ASSERT_TRUE(std::isfinite(x));
   }
-}
-
-TEST(WavFile, RealRecordingsAreRead) {
-  const auto shared = test::find_shared();
-  if (!shared) GTEST_SKIP() << "SKIPPED: no recordings: the folder shared/ is not beside the checkout";
-  const auto drill = read_wav(*shared / "data/sound/chai3d_drill.wav", {.channel = Channel::left});
-  ASSERT_TRUE(drill) << drill.error().message;
-  EXPECT_EQ(drill->rate_hz, 48000);
-  EXPECT_NEAR(drill->seconds(), 3.44, 0.01);
-  const auto saw = read_wav(*shared / "data/sound/opensfx_40_circular_saw.wav");
-  ASSERT_TRUE(saw) << saw.error().message;
-  EXPECT_NEAR(saw->seconds(), 3.90, 0.01);
 }
 
 TEST(Resample, AToneStaysAsItIsAndDoesNotMove) {
