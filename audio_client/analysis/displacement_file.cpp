@@ -63,7 +63,7 @@ Result<std::vector<DisplacementRow>> read_displacement(const std::filesystem::pa
   for (const auto& [at, name] : {std::pair{time, "time_s"}, std::pair{mm, "displacement_mm"}})
     if (at == columns.size())
       return bad_input(file.string() + ": line 1 has no column " + name +
-                       "; begin the table with time_s,displacement_mm");
+                       "; begin the table with time_s,displacement_mm, separated by a comma");
 
   std::vector<DisplacementRow> rows;
   for (int number = 2; !rest.empty(); ++number) {
@@ -73,6 +73,10 @@ Result<std::vector<DisplacementRow>> read_displacement(const std::filesystem::pa
       return file.string() + ": line " + std::to_string(number) + ": " + std::string(name) + " ";
     };
     const std::vector<std::string_view> fields = fields_of(line);
+    if (fields.size() > columns.size())
+      return bad_input(file.string() + ": line " + std::to_string(number) + " has " + std::to_string(fields.size()) +
+                       " fields, and line 1 has " + std::to_string(columns.size()) +
+                       "; separate fields by commas, and write numbers with a point");
     for (const std::size_t needed : {time, mm})
       if (needed >= fields.size() || !read_number<double>(fields[needed]))
         return bad_input(at(columns[needed]) + "is no number" +

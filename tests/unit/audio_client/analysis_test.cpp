@@ -544,6 +544,10 @@ TEST_F(AnalyseProgram, WrongUseIsOneSentenceEach) {
        {"e.csv", "line 2", "depth_mm"}},
       {{drilling, "--out", (temp_ / "out").string(), "--displacement", put("f.csv", "time_s,depth_mm\n")},
        {"f.csv", "no row"}},
+      {{drilling, "--out", (temp_ / "out").string(), "--displacement", put("h.csv", "time_s,depth_mm\n0,0,1,5\n")},
+       {"h.csv: line 2 has 4 fields, and line 1 has 2", "with a point"}},
+      {{drilling, "--out", (temp_ / "out").string(), "--displacement", put("i.csv", "time_s;depth_mm\n0;1\n")},
+       {"i.csv", "separated by a comma"}},
       {{drilling, "--out", (temp_ / "out").string(), "--displacement", put("g.csv", "")}, {"g.csv", "time_s"}},
   };
   for (const Wrong& wrong : cases) {
