@@ -3,6 +3,7 @@
 #include <nlohmann/json.hpp>
 
 #include <algorithm>
+#include <cerrno>
 #include <chrono>
 #include <cmath>
 #include <cstdio>
@@ -12,6 +13,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <system_error>
 #include <thread>
 #include <utility>
 
@@ -307,8 +309,10 @@ int main(int argc, char** argv) {
   if (command) {
     const Result<std::string> text = command();
     if (!text) return log::exit_with(kProgram, text.error());
-    std::fputs(text->c_str(), stdout);
-    return 0;
+    if (std::fputs(text->c_str(), stdout) >= 0 && std::fflush(stdout) == 0) return 0;
+    return log::exit_with(
+        kProgram, {ErrorCode::internal, "cannot write the result to standard output: " +
+                                            std::generic_category().message(errno) + "; send it to another file"});
   }
   if (options.server.empty())
     return log::exit_with(kProgram, {ErrorCode::invalid_input, "--server is required; see osteon-audio --help"});

@@ -334,6 +334,13 @@ std::vector<std::string> lines_of(const std::string& text) {
   return lines;
 }
 
+TEST_F(AnalyseProgram, AResultThatCannotBePrintedIsAFailure) {
+  const test::RunResult full = test::run("/bin/sh", {"-c", "exec \"$0\" analyse \"$1\" > /dev/full",
+                                                     test::program("osteon-audio").string(), wav().string()});
+  EXPECT_EQ(full.exit_code, 1);
+  EXPECT_THAT(full.err, testing::HasSubstr("standard output: No space left on device; send it"));
+}
+
 TEST_F(AnalyseProgram, WritesAFolderOfTablesAndPictures) {
   ASSERT_NO_FATAL_FAILURE(make_folder());
   EXPECT_EQ(test::names_in(temp_ / "out"),
