@@ -68,7 +68,7 @@ TEST_F(WindowEnds, AHiddenWindowKeepsNothingOfWhatArrives) {
   release(middle());
   ASSERT_TRUE(until([&] { return !view_->pointer().pushing(); }));
   window_->hide();
-  trigger("undo");
+  undo_pushes();
   ASSERT_TRUE(until([&] { return !cut(); })) << problem();
   EXPECT_FALSE(view_->updater()->any_arrivals());
 }

@@ -139,6 +139,10 @@ void WindowBench::trigger(const char* action) {
   found->trigger();
 }
 
+void WindowBench::undo_pushes() {
+  for (; pushes_ > 0; --pushes_) trigger("undo");
+}
+
 void WindowBench::hover(const QPoint& at) {
   QTest::mouseMove(frame(), in_frame(at + QPoint(1, 0)));
   QTest::mouseMove(frame(), in_frame(at));

@@ -64,6 +64,8 @@ class WindowBench : public testing::Test {
     });
   }
   void trigger(const char* action);
+  // Undoes every push so far, with one undo for each.
+  void undo_pushes();
 
   // The mouse, in pixels of the view. QTest's moves of a widget go through the screen's pointer, which comes late and
   // knows no pressed buttons. Its events of a window go the way that the platform's go.
@@ -71,7 +73,7 @@ class WindowBench : public testing::Test {
   [[nodiscard]] QWindow* frame() const { return window_->windowHandle(); }
   [[nodiscard]] QPoint in_frame(const QPoint& at) const { return view_->mapTo(window_.get(), at); }
   void hover(const QPoint& at);
-  void press(const QPoint& at) { QTest::mousePress(frame(), Qt::LeftButton, {}, in_frame(at)); }
+  void press(const QPoint& at) { ++pushes_, QTest::mousePress(frame(), Qt::LeftButton, {}, in_frame(at)); }
   void release(const QPoint& at) { QTest::mouseRelease(frame(), Qt::LeftButton, {}, in_frame(at)); }
   void double_click(const QPoint& at) { QTest::mouseDClick(frame(), Qt::LeftButton, {}, in_frame(at)); }
 
@@ -81,6 +83,7 @@ class WindowBench : public testing::Test {
   static std::unique_ptr<Desk> desk_;
   std::unique_ptr<MainWindow> window_;
   BoneView* view_ = nullptr;
+  int pushes_ = 0;
 };
 
 }  // namespace osteon::test

@@ -68,7 +68,7 @@ TEST_F(WindowTest, AMouseDrillsTheBoneAndUndoBringsItBack) {
   hover(middle() + QPoint(80, 0));
   EXPECT_TRUE(until([&] { return state().pose_bone_tool.position_mm.z() > 0.1; }));
   // One undo takes back the whole push.
-  trigger("undo");
+  undo_pushes();
   ASSERT_TRUE(until([&] { return window_->statusBar()->currentMessage() == "Undone."; })) << problem();
   EXPECT_TRUE(until([&] { return !cut(); })) << problem();
 }

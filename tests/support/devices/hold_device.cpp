@@ -1,5 +1,8 @@
 // A program for tests of the motors at a program's end. It holds a haptic device with force on it, and then ends in the
-// given way. hold_device phantom|force-dimension|falcon LIBRARY wait|exit|abort|crash|check (a falcon needs no library)
+// given way, as soon as standard input has a line.
+// hold_device phantom|force-dimension|falcon LIBRARY wait|exit|abort|crash|check (a falcon needs no library)
+#include <poll.h>
+
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
@@ -48,7 +51,8 @@ int main(int argc, char** argv) {
     (void)device->read();
     device->write({Vec3(1.0, 0.0, 0.0), Vec3::Zero()});
     if (i == 300) std::puts("holding"), std::fflush(stdout);
-    if (i > 300) {
+    pollfd input{.fd = 0, .events = POLLIN, .revents = 0};
+    if (i > 300 && ::poll(&input, 1, 0) > 0) {
       if (end == "exit") std::exit(0);
       if (end == "abort") std::abort();
       if (end == "check") OSTEON_CHECK(kind.empty());

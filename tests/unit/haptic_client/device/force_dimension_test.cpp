@@ -206,6 +206,7 @@ TEST_F(ForceDimensionArm, ItsMotorsEndWithTheProgram) {
   for (const char* how : {"exit", "abort", "crash"}) {
     arm().reset();
     osteon::test::Process child(osteon::test::program("hold_device"), {"force-dimension", OSTEON_STAND_IN_DHD, how});
+    child.write("end\n");
     ASSERT_TRUE(child.wait(kPatience)) << how;
     EXPECT_GT(arm()->peak_n, 0.9) << how;
     EXPECT_EQ(arm()->emergency_stops, 1u) << how;

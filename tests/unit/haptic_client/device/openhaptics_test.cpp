@@ -298,6 +298,7 @@ TEST_P(PhantomsEnd, StopsTheScheduler) {
   const End end = GetParam();
   osteon::test::Process child(osteon::test::program("hold_device"), {"phantom", OSTEON_STAND_IN_HD, end.how});
   ASSERT_TRUE(child.wait_for_out("holding", kPatience)) << child.err();
+  child.write("end\n");
   if (end.signal) child.signal(end.signal);
   ASSERT_TRUE(child.wait(kPatience));
   // A thread that looks after the device may begin to open it anew just then. It must stop what it starts.
