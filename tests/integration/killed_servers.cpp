@@ -63,7 +63,8 @@ KilledServers kill_servers(int kills, std::uint64_t seed) {
     if (!wait_until(all_stand, 60s)) report.fault = "a hand did not come back to its room";
     if (report.kills > 0) report.back.record(std::chrono::steady_clock::now() - listens);
     const std::uint64_t before = acknowledged();
-    // Three of four servers are killed during work, however slow the machine is. The fourth may still welcome its hands.
+    // Three of four servers are killed during work, however slow the machine is. The fourth may still welcome its
+    // hands.
     if (report.kills % 4 != 3 && !wait_until([&] { return acknowledged() > before; }, 60s))
       report.fault = "no cut was acknowledged after a start";
     std::this_thread::sleep_for(std::chrono::microseconds(random.index(60'000)));
