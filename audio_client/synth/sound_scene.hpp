@@ -30,8 +30,13 @@ struct ToolSound {
   std::uint32_t blows = 0;   // so far
   double blow_impulse_N_s = 0;
   Vec3 tip_mm = Vec3::Zero();  // of the tool, bone frame
-  std::int64_t time_ns = 0;    // of the state, by the clock of the tool's haptic client; 0: unknown
+  double depth_mm = 0;         // of the tip from its entry
+  CuttingPhase phase = CuttingPhase::idle;
+  std::int64_t time_ns = 0;  // of the state, by the clock of the tool's haptic client; 0: unknown
 };
+
+// Limits of the numbers above. Whoever computes ahead stays within them.
+inline constexpr double kMaxRpm = 120'000.0, kMaxLoad = 1.5, kMaxHardness = 1.2, kMaxChips = 1.5;
 
 inline constexpr int kMaxTools = 8;
 

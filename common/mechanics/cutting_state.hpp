@@ -10,6 +10,9 @@ namespace osteon {
 
 enum class CuttingPhase : std::uint8_t { idle = 1, free = 2, cutting = 3, rubbing = 4 };
 
+// No clock that began with its machine is later: 146 years. So times can be added and subtracted.
+inline constexpr std::int64_t kLatestState_ns = std::int64_t{1} << 62;
+
 struct CuttingState {
   AuthorId author;
   std::uint64_t state_seq = 0;
