@@ -14,7 +14,7 @@
 
 namespace osteon::audio {
 
-// Least of the values of the last seconds. A machine's clock drifts by less than 0.1 ms in that time.
+// Least of the values of the last seconds. Clocks of two machines drift by less than 1 ms in that time.
 class RecentLeast {
  public:
   void add(std::int64_t value, std::int64_t at_ns) noexcept;  // [audio]
