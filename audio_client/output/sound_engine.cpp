@@ -19,7 +19,7 @@ SoundEngine::SoundEngine(const SynthParams& params) : rate_hz_(params.rate_hz), 
 void SoundEngine::render(std::span<float> mono) noexcept {
   const std::int64_t start_ns = now_ns();
   if (frames() == 0) first_frame_ns_.store(start_ns, std::memory_order_relaxed);
-  take_scene(start_ns);
+  take_scenes(start_ns);
   synth_.process(mono);
   if (recorder_) recorder_->push(mono);
 
@@ -47,10 +47,15 @@ void SoundEngine::note_played(std::span<const float> mono) noexcept {
   buffer_frames_.store(mono.size(), std::memory_order_relaxed);
 }
 
-void SoundEngine::take_scene(std::int64_t start_ns) noexcept {
-  if (!scenes_.refresh()) return;
-  const SoundScene& scene = scenes_.value();
-  synth_.aim(scene);
+void SoundEngine::take_scenes(std::int64_t start_ns) noexcept {
+  for (SoundScene scene; arrivals_.try_pop(scene);) states_.take(scene);
+  const bool fresh = scenes_.refresh();
+  if (fresh) states_.take(scenes_.value());
+  if (fresh || states_.moves()) synth_.aim(states_.at(start_ns));
+  if (fresh) note_sounded(scenes_.value(), start_ns);
+}
+
+void SoundEngine::note_sounded(const SoundScene& scene, std::int64_t start_ns) noexcept {
   for (int t = 0; t < scene.count; ++t) {
     const ToolSound& tool = scene.tools[static_cast<std::size_t>(t)];
     const auto known = last_.tools.begin() + last_.count;

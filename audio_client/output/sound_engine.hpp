@@ -1,4 +1,5 @@
-// Runs on the sound card's thread: takes the newest scene, renders and records it, and notes when it was first used.
+// Runs on the sound card's thread: takes the scenes that have come, computes them ahead to now, renders and records
+// them, and notes when each was first used.
 #pragma once
 #include <array>
 #include <atomic>
@@ -11,6 +12,7 @@
 #include "audio_client/output/volume_ramp.hpp"
 #include "audio_client/output/wav_recorder.hpp"
 #include "audio_client/synth/drill_synth.hpp"
+#include "audio_client/synth/state_extrapolator.hpp"
 #include "common/runtime/spsc_queue.hpp"
 #include "common/runtime/tick_stats.hpp"
 #include "common/runtime/triple_buffer.hpp"
@@ -35,7 +37,12 @@ class SoundEngine final : public SoundSource {
   // render().
   void record_to(WavRecorder& recorder) noexcept { recorder_ = &recorder; }
 
-  void deliver(const SoundScene& scene) noexcept { scenes_.store(scene); }            // one thread only
+  // One thread only. While nobody renders, the queue becomes full and the buffer keeps the newest scene. It gets each
+  // scene first, so that nothing older is read after a newer one.
+  void deliver(const SoundScene& scene) noexcept {
+    scenes_.store(scene);
+    arrivals_.try_push(scene);
+  }
   void render(std::span<float> mono) noexcept override;                               // [audio]
   bool next_sounded(Sounded& sounded) noexcept { return sounded_.try_pop(sounded); }  // one thread only
   // The listener's volume from now on, a factor of the amplitude, 0 to 1. The sound follows without a click.
@@ -64,13 +71,16 @@ class SoundEngine final : public SoundSource {
   [[nodiscard]] const DurationHistogram& work() const noexcept { return work_; }
 
  private:
-  void take_scene(std::int64_t now_ns) noexcept;
+  void take_scenes(std::int64_t now_ns) noexcept;
+  void note_sounded(const SoundScene& scene, std::int64_t start_ns) noexcept;
   void note_played(std::span<const float> mono) noexcept;
 
   double rate_hz_;
   DrillSynth synth_;
   WavRecorder* recorder_ = nullptr;
+  SpscQueue<SoundScene, 16> arrivals_;
   TripleBuffer<SoundScene> scenes_;
+  StateExtrapolator states_;  // [audio]
   SpscQueue<Sounded, 1024> sounded_;
   SoundScene last_;  // what was noted last, to note each state once
   std::atomic<std::uint64_t> frames_{0};

@@ -17,9 +17,17 @@ struct LoadScale {
 constexpr LoadScale kLoadScales[kHandpieceKinds] = {{29.0, 2.8}, {6.0, 6.0}};
 
 constexpr double kCorticalDensity_g_cm3 = 1.9;
-constexpr double kMaxRpm = 120000.0;
+constexpr double kMaxForce_N = 1000.0, kMaxTorque_Nmm = 100'000.0, kMaxFeed_mm_per_s = 1000.0, kMaxDensity_g_cm3 = 4.0;
+constexpr double kMaxCortex_mm = 100.0, kMaxImpulse_N_s = 100.0;
 
 double within(double value, double high) { return std::isfinite(value) ? std::clamp(value, 0.0, high) : 0.0; }
+
+// The name in the list of tools, which lives as long as the program.
+std::string_view lasting_name(std::string_view name) {
+  for (const Tool& tool : builtin_tools())
+    if (tool.name == name) return tool.name;
+  return {};
+}
 
 }  // namespace
 
@@ -33,18 +41,31 @@ ToolSound tool_sound(const CuttingState& state) {
       tool && tool->kind == ToolKind::round_burr ? HandpieceKind::direct_burr : HandpieceKind::geared_drill;
   sound.rpm = within(state.spindle_rpm, kMaxRpm);
   sound.suction = state.suction;
+  sound.tool = lasting_name(state.tool_name);
+  sound.cortex_mm = within(state.cortex_mm, kMaxCortex_mm);
+  sound.seated = within(state.seated, 1.0);
+  sound.blows = state.blows;
+  sound.blow_impulse_N_s = within(state.blow_impulse_N_s, kMaxImpulse_N_s);
+  sound.tip_mm = state.pose_bone_tool.position_mm;
+  sound.depth_mm = state.depth_mm;
+  sound.phase = state.phase;
+  sound.time_ns = state.time_ns;
 
   const bool contact = state.phase == CuttingPhase::cutting || state.phase == CuttingPhase::rubbing;
   if (!contact) return sound;
   const LoadScale& scale = kLoadScales[static_cast<int>(sound.handpiece)];
   const double power_W = std::abs(state.torque_Nmm) * 1e-3 * 2.0 * std::numbers::pi * sound.rpm / 60.0;
-  sound.load = within(0.5 * state.force_physical_N.norm() / scale.thrust_N + 0.5 * power_W / scale.power_W, 1.5);
-  sound.hardness = within(state.density_g_cm3 / kCorticalDensity_g_cm3, 1.2);
+  sound.force_N = within(state.force_physical_N.norm(), kMaxForce_N);
+  sound.torque_Nmm = within(std::abs(state.torque_Nmm), kMaxTorque_Nmm);
+  sound.feed_mm_per_s = within(state.feed_mm_per_s, kMaxFeed_mm_per_s);
+  sound.density_g_cm3 = within(state.density_g_cm3, kMaxDensity_g_cm3);
+  sound.load = within(0.5 * state.force_physical_N.norm() / scale.thrust_N + 0.5 * power_W / scale.power_W, kMaxLoad);
+  sound.hardness = within(state.density_g_cm3 / kCorticalDensity_g_cm3, kMaxHardness);
   sound.advancing = state.feed_mm_per_s > 0;
   if (state.phase == CuttingPhase::cutting) {
     // The removed mass determines the flow. Soft bone crumbles; hard bone breaks into audible chips.
     const double flow = within(state.feed_mm_per_s, 1000.0) * sound.hardness;
-    sound.chips = std::min(1.5, std::sqrt(flow) * std::pow(sound.hardness, 0.7));
+    sound.chips = std::min(kMaxChips, std::sqrt(flow) * std::pow(sound.hardness, 0.7));
   }
   return sound;
 }

@@ -3,6 +3,7 @@
 #include <array>
 #include <cstdint>
 #include <span>
+#include <string_view>
 
 #include "audio_client/synth/handpiece.hpp"
 #include "common/mechanics/cutting_state.hpp"
@@ -14,12 +15,28 @@ struct ToolSound {
   std::uint64_t state_seq = 0;
   HandpieceKind handpiece = HandpieceKind::geared_drill;
   double rpm = 0;
-  double load = 0;         // 0 free; 1 at the cortical reference point of the hand piece; at most 1.5
-  double hardness = 0;     // density under the cutting part / 1.9 g/cm^3, 0 without contact
-  double chips = 0;        // chip flow, 0 without cutting; 1 at 1 mm/s through cortical bone; at most 1.5
-  bool advancing = false;  // moves into the bone
-  bool suction = false;    // the user's other hand holds the sucker
+  double load = 0;           // 0 free; 1 at the cortical reference point of the hand piece; at most 1.5
+  double hardness = 0;       // density under the cutting part / 1.9 g/cm^3, 0 without contact
+  double chips = 0;          // chip flow, 0 without cutting; 1 at 1 mm/s through cortical bone; at most 1.5
+  bool advancing = false;    // moves into the bone
+  bool suction = false;      // the user's other hand holds the sucker
+  std::string_view tool;     // name of the definition; static, or owned by the presets; empty for a tool unknown here
+  double force_N = 0;        // of the bone on the tool
+  double torque_Nmm = 0;     // of the bone on the spindle
+  double feed_mm_per_s = 0;  // into the bone
+  double density_g_cm3 = 0;  // under the cutting part, 0 without contact
+  double cortex_mm = 0;      // thickness of the cortical layer, 0 if unknown
+  double seated = 0;         // of a broach, 0 to 1
+  std::uint32_t blows = 0;   // so far
+  double blow_impulse_N_s = 0;
+  Vec3 tip_mm = Vec3::Zero();  // of the tool, bone frame
+  double depth_mm = 0;         // of the tip from its entry
+  CuttingPhase phase = CuttingPhase::idle;
+  std::int64_t time_ns = 0;  // of the state, by the clock of the tool's haptic client; 0: unknown
 };
+
+// Limits of the numbers above. Whoever computes ahead stays within them.
+inline constexpr double kMaxRpm = 120'000.0, kMaxLoad = 1.5, kMaxHardness = 1.2, kMaxChips = 1.5;
 
 inline constexpr int kMaxTools = 8;
 

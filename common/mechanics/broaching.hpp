@@ -25,6 +25,8 @@ struct BroachingParams {
 // Advance of one blow, mm. Zero if the broach is seated.
 [[nodiscard]] double blow_advance_mm(const BroachingParams& params, double engaged_area_mm2,
                                      GramsPerCm3 density) noexcept;
+// Resistance over that at which the broach is seated, 0 to 1. The advance of a blow is seated_mm over it.
+[[nodiscard]] double seating(const BroachingParams& params, double engaged_area_mm2, GramsPerCm3 density) noexcept;
 // Blows per minute as a feed law. The feed is at most what the blows produce, and reaches that if the broach is held
 // firmly.
 [[nodiscard]] FeedLaw broaching_law(const BroachingParams& params, RevolutionsPerMinute blows, double engaged_area_mm2,

@@ -11,6 +11,7 @@ namespace osteon {
 namespace {
 
 constexpr double kTurn = 2.0 * std::numbers::pi;
+constexpr double kLoose_mm = 0.5;  // a broach that is drawn back so far sits no longer [A]
 
 }  // namespace
 
@@ -81,9 +82,15 @@ double BroachDrive::step(const BlowParams& params, double blows_per_minute, doub
   until_blow_s_ -= dt_s;
   if (!struck || !striking_) until_blow_s_ = std::max(0.0, until_blow_s_);  // missed blows are not made up for
   striking_ = struck;
+  drawn_mm_ = held_n > 0.0 ? 0.0 : drawn_mm_ + std::max(0.0, -gone_mm);
+  if (held_n > 0.0)
+    seating_ = osteon::seating(params.law, engaged_area_mm2, GramsPerCm3{density_g_cm3});
+  else if (drawn_mm_ > kLoose_mm)
+    seating_ = 0.0;
   if (struck && until_blow_s_ <= 0.5 * dt_s) {
     until_blow_s_ += 60.0 / blows_per_minute;
     ++blows_;
+    impulse_n_s_ = params.law.impulse_n_s;
     const double advance_mm = blow_advance_mm(params.law, engaged_area_mm2, GramsPerCm3{density_g_cm3});
     seated_ = !(advance_mm > 0.0);
     left_mm_ = advance_mm * std::min(1.0, held_n / params.law.hold_n);
@@ -91,6 +98,13 @@ double BroachDrive::step(const BlowParams& params, double blows_per_minute, doub
     lasts_s_ = params.contact_s;
   }
   return std::min(left_mm_, speed_mm_per_s_ * dt_s);
+}
+
+void BroachDrive::take_up() noexcept {
+  BroachDrive fresh;
+  fresh.blows_ = blows_;
+  fresh.impulse_n_s_ = impulse_n_s_;
+  *this = fresh;
 }
 
 SpindleParams motor_of(const Tool& tool) noexcept {
@@ -138,7 +152,7 @@ void CuttingEffects::take_up() noexcept {
   clogging_ = {};
   grab_ = {};
   binding_ = {};
-  drive_ = {};
+  drive_.take_up();
   may_go_mm_per_s_ = 0.0;
 }
 

@@ -127,10 +127,16 @@ class BroachDrive {
   double step(const BlowParams& params, double blows_per_minute, double engaged_area_mm2, double density_g_cm3,
               double held_n, double gone_mm, double dt_s) noexcept;
   [[nodiscard]] bool seated() const noexcept { return seated_; }
+  // Of the bone that the next blow meets, as when the broach was held last; 0 before that, and once it is drawn back.
+  [[nodiscard]] double seating() const noexcept { return seating_; }
   [[nodiscard]] int blows() const noexcept { return blows_; }
+  [[nodiscard]] double impulse_n_s() const noexcept { return impulse_n_s_; }  // of the newest blow; 0 before the first
+  // Forgets all but the blows, which are counted on: whoever counts by their number misses none.
+  void take_up() noexcept;
 
  private:
   double until_blow_s_ = 0, lasts_s_ = 0, left_mm_ = 0, speed_mm_per_s_ = 0;
+  double seating_ = 0, drawn_mm_ = 0, impulse_n_s_ = 0;
   int blows_ = 0;
   bool seated_ = false, striking_ = false;
 };

@@ -10,6 +10,9 @@ namespace osteon {
 
 enum class CuttingPhase : std::uint8_t { idle = 1, free = 2, cutting = 3, rubbing = 4 };
 
+// No clock that began with its machine is later: 146 years. So times can be added and subtracted.
+inline constexpr std::int64_t kLatestState_ns = std::int64_t{1} << 62;
+
 struct CuttingState {
   AuthorId author;
   std::uint64_t state_seq = 0;
@@ -30,6 +33,11 @@ struct CuttingState {
   bool on_metal = false;      // the spindle turns, but metal is in the way: the tool cuts nothing
   bool irrigation = false, suction = false;  // by the user's other hand
   double flutes_full = 0;                    // share of the tool's flutes that chips fill, 0 to 1
+  std::int64_t time_ns = 0;                  // when the tool was here, by the haptic client's steady clock; 0: unknown
+  double cortex_mm = 0;     // thickness of the cortical layer that the tool cuts, along its feed; 0: none, or unknown
+  double seated = 0;        // of a broach, 0 to 1: how little the next blow would drive it
+  std::uint32_t blows = 0;  // of mallet or handpiece on this tool so far
+  double blow_impulse_N_s = 0;  // of the newest blow
 };
 
 }  // namespace osteon

@@ -22,7 +22,8 @@ bool has_news(const KnownToolState& said, const KnownToolState& now, const PoseD
   return has_moved(said.state.pose_bone_tool, now.state.pose_bone_tool, band) ||
          has_moved(said.state.pose_bone_device, now.state.pose_bone_device, band) || said.buttons != now.buttons ||
          said.state.phase != now.state.phase || said.state.on_metal != now.state.on_metal ||
-         said.state.irrigation != now.state.irrigation || said.state.suction != now.state.suction;
+         said.state.irrigation != now.state.irrigation || said.state.suction != now.state.suction ||
+         said.state.blows != now.state.blows;
 }
 
 }  // namespace
@@ -139,7 +140,15 @@ std::optional<IndexedEntry> ClientLink::take_entry() {
 // When the state itself needs a packet.
 Time ClientLink::state_due() const {
   if (moved_) return said_at_ + endpoint_.options().state_interval;
-  return state_ && at_the_bone(*state_) ? effort_at_ + endpoint_.options().effort_interval : Time::max();
+  return state_ && at_the_bone(*state_) ? effort_at_ + effort_interval() : Time::max();
+}
+
+// At the bone each state has its effort. The sound computes ahead from pairs of states, whose forces must be as new as
+// their times.
+Time ClientLink::effort_interval() const {
+  const LinkOptions& options = endpoint_.options();
+  return state_ && at_the_bone(*state_) ? std::min(options.effort_interval, options.state_interval)
+                                        : options.effort_interval;
 }
 
 Time ClientLink::push_due() const { return push_ ? pushed_at_ + endpoint_.options().bone_interval : Time::max(); }
@@ -147,7 +156,7 @@ Time ClientLink::push_due() const { return push_ ? pushed_at_ + endpoint_.option
 // The tool's state for the packet that goes now. Empty if there is nothing new.
 v1::UpPacket ClientLink::state_part(Time now) const {
   v1::UpPacket part;
-  const Time interval = endpoint_.options().effort_interval;
+  const Time interval = effort_interval();
   if (state_ && (state_due() <= now || now - said_at_ >= interval))
     *part.mutable_state() = to_tool_state(state_->state, state_->buttons, now - effort_at_ >= interval);
   return part;

@@ -91,6 +91,7 @@ class ClientLink {
   bool note_arrival(std::uint64_t index);
   void keep_partner(KnownToolState state, Time now);
   [[nodiscard]] Time state_due() const;
+  [[nodiscard]] Time effort_interval() const;
   [[nodiscard]] Time push_due() const;
   [[nodiscard]] v1::UpPacket state_part(Time now) const;
   void said_state(const v1::UpPacket& part, Time now);

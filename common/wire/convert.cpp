@@ -122,6 +122,11 @@ v1::CuttingState to_wire(const CuttingState& state) {
   out.set_irrigation(state.irrigation);
   out.set_suction(state.suction);
   out.set_flutes_full(state.flutes_full);
+  out.set_time_ns(state.time_ns);
+  out.set_cortex_mm(state.cortex_mm);
+  out.set_seated(state.seated);
+  out.set_blows(state.blows);
+  out.set_blow_impulse_n_s(state.blow_impulse_N_s);
   return out;
 }
 
@@ -208,7 +213,8 @@ Result<CuttingState> from_wire(const v1::CuttingState& state) {
   out.force_physical_N = from_wire(state.force_physical_n());
   if (!all_of_a_tool({state.spindle_rpm(), state.feed_mm_per_s(), state.density_g_cm3(), state.engaged_fraction(),
                       state.torque_n_mm(), state.depth_mm(), state.flutes_full(), out.force_physical_N.norm(),
-                      state.force_hand_n(), state.device_holds_n()}))
+                      state.force_hand_n(), state.device_holds_n(), state.cortex_mm(), state.seated(),
+                      state.blow_impulse_n_s()}))
     return bad_field("cutting state", "has a number that is not finite or too large for a tool");
   out.spindle_rpm = state.spindle_rpm();
   out.feed_mm_per_s = state.feed_mm_per_s();
@@ -225,6 +231,12 @@ Result<CuttingState> from_wire(const v1::CuttingState& state) {
   out.irrigation = state.irrigation();
   out.suction = state.suction();
   out.flutes_full = state.flutes_full();
+  if (state.time_ns() < 0 || state.time_ns() > kLatestState_ns) return bad_field("time_ns", "is not of a clock");
+  out.time_ns = state.time_ns();
+  out.cortex_mm = state.cortex_mm();
+  out.seated = state.seated();
+  out.blows = state.blows();
+  out.blow_impulse_N_s = state.blow_impulse_n_s();
   return out;
 }
 

@@ -10,6 +10,8 @@ namespace osteon::wire {
 namespace {
 
 constexpr std::size_t kMostNameBytes = 64;
+constexpr std::int64_t kMicrosecond_ns = 1000;
+constexpr auto kLatest_us = static_cast<std::uint64_t>(kLatestState_ns / kMicrosecond_ns);
 
 // Whole steps, clamped to the type's range. 0 for NaN.
 template <class Integer>
@@ -58,6 +60,8 @@ v1::ToolState to_tool_state(const CuttingState& state, std::uint32_t buttons, bo
   out.set_on_metal(state.on_metal);
   out.set_irrigation(state.irrigation);
   out.set_suction(state.suction);
+  out.set_time_us(static_cast<std::uint64_t>(std::max<std::int64_t>(0, state.time_ns) / kMicrosecond_ns));
+  out.set_blows(state.blows);
   if (!with_effort) return out;
   v1::ToolEffort& effort = *out.mutable_effort();
   effort.set_tool_name(state.tool_name.substr(0, kMostNameBytes));
@@ -70,6 +74,9 @@ v1::ToolState to_tool_state(const CuttingState& state, std::uint32_t buttons, bo
   effort.set_force_hand(steps<std::uint32_t>(state.force_hand_N, 1000.0));
   effort.set_device_holds(steps<std::uint32_t>(state.device_holds_N, 1000.0));
   effort.set_flutes_full(steps<std::uint32_t>(std::clamp(state.flutes_full, 0.0, 1.0), 1000.0));
+  effort.set_cortex(steps<std::uint32_t>(state.cortex_mm, 100.0));
+  effort.set_seated(steps<std::uint32_t>(std::clamp(state.seated, 0.0, 1.0), 1000.0));
+  effort.set_blow_impulse(steps<std::uint32_t>(state.blow_impulse_N_s, 1000.0));
   return out;
 }
 
@@ -93,12 +100,16 @@ Result<bool> take_over(const v1::ToolState& sent, KnownToolState& known) {
   next.on_metal = sent.on_metal();
   next.irrigation = sent.irrigation();
   next.suction = sent.suction();
+  if (sent.time_us() > kLatest_us) return bad_field("time_us", "is later than any clock");
+  next.time_ns = static_cast<std::int64_t>(sent.time_us()) * kMicrosecond_ns;
+  next.blows = sent.blows();
   if (sent.has_effort()) {
     const v1::ToolEffort& effort = sent.effort();
     if (effort.force_size() != 3)
       return bad_field("effort.force", "needs 3 numbers, this has " + std::to_string(effort.force_size()));
     if (effort.engaged() > 1000) return bad_field("effort.engaged", "must be at most 1000");
     if (effort.flutes_full() > 1000) return bad_field("effort.flutes_full", "must be at most 1000");
+    if (effort.seated() > 1000) return bad_field("effort.seated", "must be at most 1000");
     if (effort.tool_name().size() > kMostNameBytes) return bad_field("effort.tool_name", "is longer than 64 bytes");
     next.tool_name = effort.tool_name();
     for (int i = 0; i < 3; ++i) next.force_physical_N[i] = effort.force(i) / 1000.0;
@@ -110,6 +121,9 @@ Result<bool> take_over(const v1::ToolState& sent, KnownToolState& known) {
     next.force_hand_N = effort.force_hand() / 1000.0;
     next.device_holds_N = effort.device_holds() / 1000.0;
     next.flutes_full = effort.flutes_full() / 1000.0;
+    next.cortex_mm = effort.cortex() / 100.0;
+    next.seated = effort.seated() / 1000.0;
+    next.blow_impulse_N_s = effort.blow_impulse() / 1000.0;
   }
   known = {next, sent.buttons()};
   return true;

@@ -16,6 +16,7 @@ constexpr int kPriority = 80;
 constexpr auto kStall = 4ms;                // more than three periods: the force is zero by then
 constexpr std::uint64_t kLiveTicks = 1000;  // between two statistics of the loop
 constexpr int kRunDownTicks = 500;
+constexpr std::uint64_t kProbeTicks = 8;  // between two looks for cortical bone: states go every 16
 
 }  // namespace
 
@@ -58,6 +59,7 @@ void HapticWorker::tick(int periods, std::int64_t woke_ns) {
   const int periods_of_hand = session_.simulated_time() ? 1 : periods;
   const SessionTick now = session_.tick(exchange_.patches.value(), room, periods_of_hand, &exchange_.guides.value());
   last_ = now.report;
+  probe_cortex();
   exchange_.items_left.store(session_.left().size(), std::memory_order_release);
 
   exchange_.tick_times.set(now.report.state_seq, woke_ns);
@@ -100,6 +102,14 @@ void HapticWorker::move_bone() {
   if (const std::optional<MountLoad> push = mount_.push()) exchange_.mount_loads.store(*push);
 }
 
+// After the force has gone to the device. It takes a few microseconds.
+void HapticWorker::probe_cortex() {
+  if (last_.state_seq % kProbeTicks != 0 || session_.plan().tools.empty()) return;
+  const bool touching = last_.cutting.phase == CuttingPhase::cutting || last_.cutting.phase == CuttingPhase::rubbing;
+  cortex_.step(session_.loop().tool(last_.tool), exchange_.patches.value(), last_.pose_bone_proxy, touching,
+               -last_.coupling.force_n);
+}
+
 void HapticWorker::fill_row(const SessionTick& now, bool idle, std::int64_t woke_ns) {
   row_.mono_ns = woke_ns;
   row_.phase = now.order.phase;
@@ -111,6 +121,7 @@ void HapticWorker::fill_row(const SessionTick& now, bool idle, std::int64_t woke
     row_.depth_mm = (now.report.pose_bone_proxy.position_mm - site_->entry_mm).dot(site_->axis);
     row_.device_depth_mm = (now.report.pose_bone_device.position_mm - site_->entry_mm).dot(site_->axis);
   }
+  row_.cortex_mm = cortex_.thickness_mm();
   row_.force_rendered_n = now.report.device.force_n.norm();
   row_.reading = now.reading;
   row_.commanded_rpm = now.commanded_rpm;

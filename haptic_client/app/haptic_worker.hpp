@@ -10,6 +10,7 @@
 #include "haptic_client/app/client_end.hpp"
 #include "haptic_client/app/client_outcome.hpp"
 #include "haptic_client/app/worker_exchange.hpp"
+#include "haptic_client/contact/cortex_probe.hpp"
 #include "haptic_client/rendering/felt_mount.hpp"
 
 namespace osteon::haptic {
@@ -32,6 +33,7 @@ class HapticWorker {
   void supervise();
   // Moves the bone on its mount under the load of the last tick.
   void move_bone();
+  void probe_cortex();
   void fill_row(const SessionTick& now, bool idle, std::int64_t woke_ns);
   // [watchdog] Reports at most every five seconds.
   void report_stall();
@@ -43,6 +45,7 @@ class HapticWorker {
   FeltMount mount_;
   TickRow row_;
   LoopReport last_;
+  CortexProbe cortex_;
   std::array<PartnerTool, Partners::kMost> felt_partners_;
   const EntrySite* site_ = nullptr;
   bool taken_up_ = false;

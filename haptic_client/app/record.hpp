@@ -18,7 +18,8 @@ struct TickRow {
   std::uint32_t step = 0;
   double depth_mm = 0, device_depth_mm = 0;  // along the axis of the step's site
   double force_rendered_n = 0;
-  bool idle = false;  // no step was under way: waiting
+  double cortex_mm = 0;  // as in CuttingState
+  bool idle = false;     // no step was under way: waiting
   LoopReport report;
   DeviceReading reading;
   double commanded_rpm = 0;

@@ -370,6 +370,14 @@ void RecordFile::Impl::make_columns() {
                        [](const R& r) { return r.report.contact.guide_play_mm; }));
   add(column<float, R>("data/flutes_full", "1", "", "share of the tool's flutes that chips fill",
                        [](const R& r) { return r.report.cutting.flutes_full; }));
+  add(column<float, R>("data/cortex", "mm", "", "thickness of the cortical layer that the tool cuts, 0 for none",
+                       [](const R& r) { return r.cortex_mm; }));
+  add(column<float, R>("data/seated", "1", "", "of a broach: its resistance over that at which it is seated",
+                       [](const R& r) { return r.report.cutting.seated; }));
+  add(column<std::uint32_t, R>("data/blows", "1", "", "blows on the tool so far",
+                               [](const R& r) { return r.report.cutting.blows; }));
+  add(column<float, R>("data/blow_impulse", "N.s", "", "of the newest blow",
+                       [](const R& r) { return r.report.cutting.blow_impulse_n_s; }));
   add(enumeration<R>("data/state", "what the tool does to the bone",
                      {{{"idle", 1}, {"free", 2}, {"cutting", 3}, {"rubbing", 4}}},
                      [](const R& r) { return static_cast<int>(r.report.cutting.phase); }));

@@ -138,6 +138,11 @@ CuttingState TelemetryWorker::state_of(const TickRow& row) const {
   state.device_holds_N = device_holds_n_;
   state.force_hand_N = device_holds_n_ > 0.0 ? row.force_rendered_n : 0.0;
   state.flutes_full = r.cutting.flutes_full;
+  state.time_ns = row.mono_ns;
+  state.cortex_mm = row.cortex_mm;
+  state.seated = r.cutting.seated;
+  state.blows = r.cutting.blows;
+  state.blow_impulse_N_s = r.cutting.blow_impulse_n_s;
   state.irrigation = (row.reading.buttons & kIrrigation) != 0;
   state.suction = (row.reading.buttons & kSuction) != 0;
   return state;

@@ -235,8 +235,7 @@ LoopReport HapticLoop::tick(const LoopInput& input, const Patch& patch, std::spa
   torque_nmm_ = load_nmm(step, moment.touching ? coupling.spring_n.norm() : 0.0);
   report.cutting.wear = params_.tool_effects ? effects_[static_cast<std::size_t>(tool_)].wear() : model.wear;
   report.cutting.law = model.law;
-  wear_and_clog(model, step, moment.touching ? coupling.spring_n : Vec3(Vec3::Zero()), input.irrigation);
-  report.cutting.flutes_full = effects_[static_cast<std::size_t>(tool_)].clogging().level();
+  wear_and_clog(model, step, moment.touching ? coupling.spring_n : Vec3(Vec3::Zero()), input.irrigation, report);
   if (moment.touching) report.coupling.torque_nmm = step.contact_torque_nmm;
 
   // The spring of the rotation belongs to the coupling. The moment of the cut does not: the bone turns a spindle back
@@ -251,8 +250,8 @@ LoopReport HapticLoop::tick(const LoopInput& input, const Patch& patch, std::spa
   return report;
 }
 
-void HapticLoop::wear_and_clog(const ToolModel& model, const ProxyStep& step, const Vec3& spring_n,
-                               bool irrigation) noexcept {
+void HapticLoop::wear_and_clog(const ToolModel& model, const ProxyStep& step, const Vec3& spring_n, bool irrigation,
+                               LoopReport& report) noexcept {
   const Vec3 axis = proxy_.pose().direction(Vec3::UnitZ());
   EffectMoment moment;
   moment.spindle_rpm = spindle_.rpm;
@@ -267,7 +266,13 @@ void HapticLoop::wear_and_clog(const ToolModel& model, const ProxyStep& step, co
   moment.irrigation = irrigation;
   // A hand that presses a blade to one side presses its plate on the kerf. The plate's normal is y.
   if (step.engaged > 0.0) moment.kerf_pressure_n = std::abs(spring_n.dot(proxy_.pose().direction(Vec3::UnitY())));
-  effects_[static_cast<std::size_t>(tool_)].step(moment, params_.dt_s);
+  CuttingEffects& effects = effects_[static_cast<std::size_t>(tool_)];
+  effects.step(moment, params_.dt_s);
+  report.cutting.flutes_full = effects.clogging().level();
+  if (!params_.tool_effects) return;
+  report.cutting.blows = static_cast<std::uint32_t>(effects.drive().blows());
+  report.cutting.blow_impulse_n_s = effects.drive().impulse_n_s();
+  report.cutting.seated = effects.drive().seating();
 }
 
 double HapticLoop::load_nmm(const ProxyStep& step, double pressed_n) noexcept {

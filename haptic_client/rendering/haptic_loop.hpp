@@ -125,6 +125,9 @@ struct LoopReport {
     const ForceLaw* law = nullptr;  // of the tool; null: there is none
     double across_n = 0;            // across the feed; the hand feels it through the motor port
     unsigned out_of_range = 0;      // bits of OutOfRange: where the law is used outside its range
+    // Of a broach: blows so far, impulse of the newest, and how near it is to being seated, 0 to 1.
+    std::uint32_t blows = 0;
+    double blow_impulse_n_s = 0, seated = 0;
   } cutting;
 
   // The spring between handle and proxy: passive, in the energy ledger.
@@ -219,7 +222,8 @@ class HapticLoop {
     return mapping_.to_device(moved_ ? bone_.direction(bone) : bone);
   }
   void record(const ToolModel& model, const ProxyStep& step, LoopReport& report) noexcept;
-  void wear_and_clog(const ToolModel& model, const ProxyStep& step, const Vec3& spring_n, bool irrigation) noexcept;
+  void wear_and_clog(const ToolModel& model, const ProxyStep& step, const Vec3& spring_n, bool irrigation,
+                     LoopReport& report) noexcept;
   [[nodiscard]] double load_nmm(const ProxyStep& step, double pressed_n) noexcept;
   // Force and torque on the handle: the coupling's within ramp, slew limit and energy, and the motor's. `cut_nmm`:
   // moment of the cut, physical.

@@ -67,6 +67,7 @@ void StatePublisher::session_over(AuthorId author) {
   ++state.state_seq;
   state.phase = CuttingPhase::idle;
   state.spindle_rpm = state.feed_mm_per_s = state.density_g_cm3 = state.engaged_fraction = state.torque_Nmm = 0;
+  state.cortex_mm = 0;
   state.force_physical_N = Vec3::Zero();
   state.force_hand_N = state.device_holds_N = 0;
   state.on_metal = state.irrigation = state.suction = false;

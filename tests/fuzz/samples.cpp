@@ -49,6 +49,11 @@ CuttingState a_state() {
   state.state_seq = 3;
   state.tool_name = "drill";
   state.pose_bone_device.position_mm.z() = -0.5;
+  state.time_ns = 5'000'000'000;
+  state.cortex_mm = 4.5;
+  state.seated = 0.5;
+  state.blows = 3;
+  state.blow_impulse_N_s = 2.8;
   return state;
 }
 

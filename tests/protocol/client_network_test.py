@@ -163,11 +163,13 @@ class Datagrams(Case):
         while self.hand.author not in others.partners and time.monotonic() < until:
             shown += 1
             path.show(client.link.ToolState(state_seq=shown, pose_bone_tool=pose, spindle_rpm=20000,
-                                            phase=client.types.CUTTING_PHASE_FREE))
+                                            phase=client.types.CUTTING_PHASE_FREE, blows=shown,
+                                            time_us=5_000_000 + shown))
             time.sleep(0.05)
         seen = others.partners[self.hand.author]
         self.assertLessEqual(seen.state_seq, shown)
         self.assertEqual((seen.pose_bone_tool, seen.spindle_rpm), (pose, 20000))
+        self.assertEqual((seen.time_us, seen.blows), (5_000_000 + seen.state_seq, seen.state_seq))
         self.assertNotIn(other.member.author, others.partners)
 
     def test_others_read_the_cuts_from_datagrams(self):

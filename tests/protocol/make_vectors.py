@@ -4,7 +4,7 @@
 
 Each expected value comes from the server, from osteon-import or from libsodium, not from wire.py. Only a
 block's normals, cut faces and tissue are as wire.py reads them, and so is all of the two vectors of noise, which no
-server sends. The programs' code confirms them (vectors_test.cpp).
+server sends, and of the state of a tool. The programs' code confirms them (vectors_test.cpp).
 """
 import base64
 import contextlib
@@ -102,6 +102,7 @@ def main():
         datagrams(add, path, watcher)
         add("block of noise", "block", *noise_block())
         add("datagram of noise", "datagram", *noise_datagram())
+        add("state of a broach", "tool_state", *broach_state())
         key = bytes(range(32))
         out = ctypes.create_string_buffer(32)
         wire.sodium().crypto_kdf_derive_from_key(out, ctypes.c_size_t(32), ctypes.c_uint64(1), b"osteonUD", key)
@@ -238,6 +239,30 @@ def noise_cut(chance, start, author, author_seq, tool, rpm, us):
 
 def wrapped_sum(numbers, step):
     return (wire.wrapped(number + by, i) for i, (number, by) in enumerate(zip(numbers, step)))
+
+
+def broach_state():
+    """A tool's state with its effort. Each number differs from the others, so that none can be exchanged."""
+    types, link = client.types, client.link
+    effort = link.ToolEffort(tool_name="broach-2", force=[1500, -250, 40125], torque=-31, feed=417, density=1203,
+                             engaged=875, depth=6200, flutes_full=62, force_hand=9001, device_holds=30000, cortex=457,
+                             seated=271, blow_impulse=2800)
+    pose = types.QuantisedPose(position=[1024, -2049, 7], rotation=[0, 0, 0, 32767])
+    state = link.ToolState(author=4, state_seq=5300, pose_bone_tool=pose, buttons=2, spindle_rpm=240,
+                           phase=types.CUTTING_PHASE_RUBBING, effort=effort, time_us=123456789012, blows=17)
+    return {"state": state.SerializeToString(deterministic=True).hex()}, state_result(state)
+
+
+def state_result(state):
+    """What a ToolState says, in the units of CuttingState. Poses stay as they are."""
+    effort = state.effort
+    milli = {name: getattr(effort, name) / 1000 for name in ("feed", "density", "engaged", "flutes_full", "force_hand",
+                                                             "device_holds", "seated", "blow_impulse")}
+    plain = {name: getattr(state, name) for name in ("author", "state_seq", "buttons", "spindle_rpm", "phase",
+                                                     "time_us", "blows")}
+    return {**plain, **milli, "position": list(state.pose_bone_tool.position), "tool_name": effort.tool_name,
+            "rotation": list(state.pose_bone_tool.rotation), "force": [f / 1000 for f in effort.force],
+            "torque": effort.torque / 100, "depth": effort.depth / 1024, "cortex": effort.cortex / 100}
 
 
 def triangles_hash(triangles):

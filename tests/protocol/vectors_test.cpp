@@ -26,6 +26,7 @@
 #include "common/tools/tool_file.hpp"
 #include "common/wire/convert.hpp"
 #include "common/wire/cut_run.hpp"
+#include "common/wire/tool_state.hpp"
 #include "server/journal/chain.hpp"
 #include "server/journal/signing.hpp"
 
@@ -186,6 +187,39 @@ Json datagram(const Json& given) {
   return out;
 }
 
+Json tool_state(const Json& given) {
+  v1::ToolState sent;
+  wire::KnownToolState known;
+  if (!sent.ParseFromString(from_hex(given["state"]))) return "not parsed";
+  const auto newer = wire::take_over(sent, known);
+  if (!newer) return newer.error().message;
+  const CuttingState& state = known.state;
+  const QuantisedPose pose = quantise(state.pose_bone_tool);
+  const Vec3& force_n = state.force_physical_N;
+  return {{"author", state.author.value},
+          {"state_seq", state.state_seq},
+          {"buttons", known.buttons},
+          {"spindle_rpm", state.spindle_rpm},
+          {"phase", static_cast<int>(state.phase)},
+          {"time_us", state.time_ns / 1000},
+          {"blows", state.blows},
+          {"position", pose.position},
+          {"rotation", pose.rotation},
+          {"tool_name", state.tool_name},
+          {"force", {force_n.x(), force_n.y(), force_n.z()}},
+          {"torque", state.torque_Nmm},
+          {"feed", state.feed_mm_per_s},
+          {"density", state.density_g_cm3},
+          {"engaged", state.engaged_fraction},
+          {"depth", state.depth_mm},
+          {"flutes_full", state.flutes_full},
+          {"force_hand", state.force_hand_N},
+          {"device_holds", state.device_holds_N},
+          {"cortex", state.cortex_mm},
+          {"seated", state.seated},
+          {"blow_impulse", state.blow_impulse_N_s}};
+}
+
 Json next_key(const Json& given) {
   const SealKey next = osteon::next_key(bytes_of<SealKey>(given["key"]));
   return to_hex({reinterpret_cast<const char*>(next.bytes.data()), next.bytes.size()});
@@ -200,6 +234,7 @@ const std::map<std::string, std::function<Json(const Json&)>>& checks() {
                                                                            {"signed_entries", signed_entries},
                                                                            {"signed_register", signed_register},
                                                                            {"datagram", datagram},
+                                                                           {"tool_state", tool_state},
                                                                            {"next_key", next_key}};
   return all;
 }

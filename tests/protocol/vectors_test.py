@@ -10,7 +10,7 @@ from pathlib import Path
 
 import client
 import wire
-from make_vectors import block_result
+from make_vectors import block_result, state_result
 
 
 
@@ -84,12 +84,17 @@ def datagram(given):
             for index, seq, cut in wire.read_entries(run.author, run.index, run.room_seq, run.head, tool, run.entries)]
 
 
+def tool_state(given):
+    return state_result(client.link.ToolState.FromString(bytes.fromhex(given["state"])))
+
+
 def next_key(given):
     return wire.next_key(bytes.fromhex(given["key"])).hex()
 
 
 CHECKS = {check.__name__: check for check in (tool_hash, field_hash, surface_hash, block, first_entry, next_entry,
-                                              witness_seal, signed_entries, signed_register, datagram, next_key)}
+                                              witness_seal, signed_entries, signed_register, datagram, tool_state,
+                                              next_key)}
 
 
 TRIED = 64  # bits of each field, or all of them if it has fewer

@@ -63,6 +63,32 @@ TEST(SoundEngine, NotesEachStateOnceWhenItIsFirstRendered) {
   EXPECT_EQ(engine.work().count(), 8U);
 }
 
+// Two states of a third and two thirds of a load, which came in one buffer and are followed by none. A period later the
+// load is whole, and stays so. Times are long past, so that the test needs none.
+TEST(SoundEngine, ALoadThatRisesGoesOnForAPeriod) {
+  constexpr std::int64_t kApart_ns = 16'000'000, kPast_ns = 200'000'000;
+  const CuttingState whole = test::cortical_drill(1345);
+  const auto state_of = [&](std::uint64_t third, bool timed) {
+    CuttingState state = whole;
+    state.state_seq = third;
+    state.force_physical_N *= static_cast<double>(third) / 3.0;
+    state.torque_Nmm *= static_cast<double>(third) / 3.0;
+    state.time_ns = timed ? static_cast<std::int64_t>(third) * kApart_ns : 0;
+    return state;
+  };
+  const auto level_db = [&](const std::vector<CuttingState>& states) {
+    SoundEngine engine(SynthParams{});
+    const std::int64_t now_ns = std::chrono::steady_clock::now().time_since_epoch().count();
+    for (const CuttingState& state : states) engine.deliver(scene_of(state, now_ns - kPast_ns + state.time_ns));
+    std::vector<float> frames(48000);
+    for (std::size_t at = 0; at < frames.size(); at += 240) engine.render(std::span(frames).subspan(at, 240));
+    return sound::rms_db(std::span(frames).last(24000));
+  };
+  const double went_on = level_db({state_of(1, true), state_of(2, true)});
+  EXPECT_NEAR(went_on, level_db({state_of(3, false)}), 0.1);
+  EXPECT_GT(went_on, level_db({state_of(1, false), state_of(2, false)}) + 0.5);
+}
+
 TEST(SoundEngine, StatedLatencyIsWhereASceneIsFirstHeard) {
   SoundEngine engine(SynthParams{});
   std::vector<float> frames(1024);

@@ -281,6 +281,39 @@ TEST(BroachDrive, StopsWhenSeated) {
   EXPECT_GT(broach.way_mm, seated_mm);
 }
 
+// Half of the area at which a blow of E = 3920 N mm drives it 0.1 mm: half seated, and the next blow goes 0.2 mm.
+TEST(BroachDrive, SaysHowNearItIsToBeingSeated) {
+  const double density = 0.5, seat_mm2 = 3920.0 / (0.1 * 130.0 * (0.5 / 1.9) * (0.5 / 1.9));
+  BroachDrive drive;
+  EXPECT_EQ(drive.seating(), 0.0);
+  for (const double share : {0.25, 0.5, 0.9}) {
+    drive.step({}, 60.0, share * seat_mm2, density, 20.0, 0.0, kDt);
+    EXPECT_NEAR(drive.seating(), share, 1e-9);
+    EXPECT_NEAR(blow_advance_mm({}, share * seat_mm2, GramsPerCm3{density}) * drive.seating(), 0.1, 1e-9);
+  }
+  drive.step({}, 60.0, 2.0 * seat_mm2, density, 20.0, 0.0, kDt);
+  EXPECT_EQ(drive.seating(), 1.0);
+  // A hand that only rests leaves it where it is. One that draws it back does not.
+  drive.step({}, 60.0, 0.0, 0.0, 0.0, -0.4, kDt);
+  EXPECT_EQ(drive.seating(), 1.0);
+  drive.step({}, 60.0, 0.0, 0.0, 0.0, -0.2, kDt);
+  EXPECT_EQ(drive.seating(), 0.0);
+}
+
+// Whoever listens by the number of blows would take a number that begins anew for none.
+TEST(BroachDrive, GoesOnCountingWhenItIsTakenUpAgain) {
+  FollowedBroach broach;
+  EXPECT_EQ(broach.drive.impulse_n_s(), 0.0);
+  for (int i = 0; i < 1500; ++i) broach.step(60.0, 400.0, 0.3, 20.0);
+  EXPECT_EQ(broach.drive.blows(), 2);
+  EXPECT_EQ(broach.drive.impulse_n_s(), 2.8);
+  broach.drive.take_up();
+  EXPECT_EQ(broach.drive.blows(), 2);
+  EXPECT_EQ(broach.drive.seating(), 0.0);
+  broach.step(60.0, 400.0, 0.3, 20.0);
+  EXPECT_EQ(broach.drive.blows(), 3) << "the first blow comes at once";
+}
+
 TEST(BroachDrive, BouncesWhenHeldLooselyAndRestsWhenNotHeld) {
   FollowedBroach firm, loose, resting;
   for (int i = 0; i < 500; ++i) {

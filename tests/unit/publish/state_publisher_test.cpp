@@ -41,6 +41,8 @@ TEST(StatePublisher, TheToolOfAnEndedSessionRests) {
   state.force_physical_N = {0, 0, 9};
   state.torque_Nmm = 8;
   state.depth_mm = 4;
+  state.cortex_mm = 5;
+  state.blows = 6;
   state.phase = CuttingPhase::cutting;
   state.force_hand_N = 9.6;
   state.device_holds_N = 30;
@@ -60,8 +62,9 @@ TEST(StatePublisher, TheToolOfAnEndedSessionRests) {
   EXPECT_EQ(rests.tool_name, state.tool_name);
   EXPECT_EQ(rests.force_physical_N, Vec3::Zero());
   for (const double none : {rests.spindle_rpm, rests.feed_mm_per_s, rests.density_g_cm3, rests.engaged_fraction,
-                            rests.torque_Nmm, rests.force_hand_N, rests.device_holds_N})
+                            rests.torque_Nmm, rests.force_hand_N, rests.device_holds_N, rests.cortex_mm})
     EXPECT_EQ(none, 0.0);
+  EXPECT_EQ(rests.blows, 6u) << "a blow that comes with the end is heard";
   EXPECT_FALSE(rests.on_metal || rests.irrigation || rests.suction);
   EXPECT_TRUE(publisher.tool_tips_mm().empty());
 }

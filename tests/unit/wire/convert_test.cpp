@@ -51,6 +51,11 @@ TEST(Wire, AStateComesBack) {
   state.device_holds_N = 0.875;
   state.suction = true;
   state.flutes_full = 0.375;
+  state.time_ns = 123'456'789'012'345;
+  state.cortex_mm = 4.5;
+  state.seated = 0.25;
+  state.blows = 17;
+  state.blow_impulse_N_s = 2.75;
   const auto back = wire::from_wire(wire::to_wire(state));
   ASSERT_TRUE(back) << back.error().message;
   EXPECT_EQ(back->state_seq, 99u);
@@ -62,6 +67,11 @@ TEST(Wire, AStateComesBack) {
   EXPECT_FALSE(back->irrigation);
   EXPECT_TRUE(back->suction);
   EXPECT_EQ(back->flutes_full, 0.375);
+  EXPECT_EQ(back->time_ns, state.time_ns);
+  EXPECT_EQ(back->cortex_mm, 4.5);
+  EXPECT_EQ(back->seated, 0.25);
+  EXPECT_EQ(back->blows, 17u);
+  EXPECT_EQ(back->blow_impulse_N_s, 2.75);
   EXPECT_EQ(back->force_physical_N, state.force_physical_N);
   EXPECT_LT((back->pose_bone_tool.position_mm - state.pose_bone_tool.position_mm).norm(), 1e-9);
 }
@@ -79,6 +89,16 @@ TEST(Wire, AStateWithoutTheOtherHandHasNone) {
   }
   sent.set_flutes_full(std::numeric_limits<double>::quiet_NaN());
   EXPECT_FALSE(wire::from_wire(sent));
+}
+
+TEST(Wire, AStateOfNoClockIsRefused) {
+  v1::CuttingState sent = wire::to_wire(CuttingState{});
+  for (const std::int64_t time_ns : {std::int64_t{-1}, std::numeric_limits<std::int64_t>::max()}) {
+    sent.set_time_ns(time_ns);
+    const auto back = wire::from_wire(sent);
+    ASSERT_FALSE(back) << time_ns;
+    EXPECT_NE(back.error().message.find("time_ns"), std::string::npos) << back.error().message;
+  }
 }
 
 // Each change makes a cut that no correct client sends. The message must name the field.

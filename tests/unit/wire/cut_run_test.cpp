@@ -712,6 +712,11 @@ TEST(ToolState, ComesBackWithinItsSteps) {
   state.flutes_full = 0.625;
   state.force_hand_N = 3.25;
   state.device_holds_N = 0.88;
+  state.time_ns = 123'456'789'012'345;
+  state.cortex_mm = 4.567;
+  state.seated = 0.375;
+  state.blows = 70'000;
+  state.blow_impulse_N_s = 2.8;
   wire::KnownToolState known;
   const v1::ToolState full = wire::to_tool_state(state, 5, true);
   ASSERT_TRUE(wire::take_over(full, known).value());
@@ -732,6 +737,11 @@ TEST(ToolState, ComesBackWithinItsSteps) {
   EXPECT_EQ(known.state.phase, state.phase);
   EXPECT_EQ(known.state.force_hand_N, 3.25);
   EXPECT_NEAR(known.state.device_holds_N, 0.88, 1e-9);
+  EXPECT_EQ(known.state.time_ns, 123'456'789'012'000) << "microseconds";
+  EXPECT_NEAR(known.state.cortex_mm, 4.567, 0.005);
+  EXPECT_EQ(known.state.seated, 0.375);
+  EXPECT_EQ(known.state.blows, 70'000u);
+  EXPECT_NEAR(known.state.blow_impulse_N_s, 2.8, 1e-9);
   EXPECT_LT((known.state.pose_bone_tool.position_mm - state.pose_bone_tool.position_mm).norm(), 0.001);
   EXPECT_LT(known.state.pose_bone_device.rotation.angularDistance(state.pose_bone_device.rotation), 2e-4);
   // A pose alone leaves the effort unchanged. An old state changes nothing.
@@ -740,6 +750,8 @@ TEST(ToolState, ComesBackWithinItsSteps) {
   state.force_physical_N = {0, 0, 0};
   state.irrigation = false;
   state.suction = true;
+  state.time_ns += 16'000'000;
+  state.blows = 70'002;  // the state between was lost
   const v1::ToolState pose_only = wire::to_tool_state(state, 0, false);
   ASSERT_TRUE(wire::take_over(pose_only, known).value());
   EXPECT_EQ(known.state.pose_bone_tool.position_mm.x(), 7);
@@ -747,6 +759,8 @@ TEST(ToolState, ComesBackWithinItsSteps) {
   EXPECT_FALSE(known.state.irrigation);
   EXPECT_TRUE(known.state.suction);
   EXPECT_EQ(known.state.flutes_full, 0.625);
+  EXPECT_EQ(known.state.time_ns, 123'456'805'012'000);
+  EXPECT_EQ(known.state.blows, 70'002u);
   EXPECT_FALSE(wire::take_over(full, known).value());
   EXPECT_EQ(known.state.state_seq, 100u);
   std::printf("a state: %zu B with its effort, %zu B without\n", full.ByteSizeLong(), pose_only.ByteSizeLong());
@@ -773,6 +787,8 @@ TEST(ToolState, RefusesBadOnesByTheNameOfTheField) {
   refused([](v1::ToolState& s) { s.mutable_effort()->add_force(1); }, "effort.force");
   refused([](v1::ToolState& s) { s.mutable_effort()->set_engaged(1001); }, "effort.engaged");
   refused([](v1::ToolState& s) { s.mutable_effort()->set_tool_name(std::string(65, 'x')); }, "effort.tool_name");
+  refused([](v1::ToolState& s) { s.mutable_effort()->set_seated(1001); }, "effort.seated");
+  refused([](v1::ToolState& s) { s.set_time_us(std::numeric_limits<std::uint64_t>::max()); }, "time_us");
 }
 
 }  // namespace

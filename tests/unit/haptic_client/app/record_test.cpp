@@ -72,6 +72,9 @@ TickRow row(std::uint64_t i) {
   row.report.cutting.phase = i % 2 ? CuttingPhase::cutting : CuttingPhase::free;
   row.report.cutting.out_of_range = static_cast<unsigned>(i % 64);
   row.report.tool = static_cast<int>(i / 700 % 2);
+  row.report.cutting.blows = static_cast<std::uint32_t>(i / 100);
+  row.report.cutting.seated = 0.25;
+  row.cortex_mm = 4.5;
   row.report.cutting.wear = 1.0 + static_cast<double>(i) / 1024.0;
   if (i >= 900) row.report.cutting.law = find_force_law(i < 1000 ? "milling" : "multi-point");  // chosen meanwhile
   row.reading.pose_device_tool = pose(random);
@@ -339,6 +342,8 @@ assert [t.decode() for t in f["metadata/tools"][:]] == ["drill-3.2", "burr-round
 laws = [t.decode() for t in f["metadata/laws"][:]]
 assert laws[:2] == ["chi", "milling"] and len(laws) == len(set(laws)), laws
 assert [laws[i] for i in f["data/law"][[699, 700, 999, 1000]]] == ["chi", "milling", "milling", "multi-point"]
+assert (f["data/blows"][:] == np.arange(1300) // 100).all()
+assert (f["data/seated"][:] == 0.25).all() and (f["data/cortex"][:] == 4.5).all()
 assert (f["data/wear"][:] == 1 + np.arange(1300) / 1024).all()
 assert f["burr_change/burr_size"][:].tolist() == [3.2, 5.0]
 assert (f["data/law_out_of_range"][:] == np.arange(1300) % 64).all()

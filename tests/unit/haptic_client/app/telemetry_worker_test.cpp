@@ -101,6 +101,24 @@ TEST_F(TelemetryWorkerTest, SendsTheNewestStateOfManyRows) {
   EXPECT_DOUBLE_EQ(exchange_.line_lag_s, 0.04);
 }
 
+TEST_F(TelemetryWorkerTest, SendsWhatTheSoundNeeds) {
+  TickRow row;
+  row.mono_ns = 123'456;
+  row.cortex_mm = 4.5;
+  row.report.state_seq = 1;
+  row.report.cutting.seated = 0.75;
+  row.report.cutting.blows = 9;
+  row.report.cutting.blow_impulse_n_s = 2.8;
+  ASSERT_TRUE(exchange_.rows.try_push(row));
+  run_to_the_end();
+  ASSERT_EQ(room_.states.size(), 1u);
+  EXPECT_EQ(room_.states[0].time_ns, 123'456);
+  EXPECT_EQ(room_.states[0].cortex_mm, 4.5);
+  EXPECT_EQ(room_.states[0].seated, 0.75);
+  EXPECT_EQ(room_.states[0].blows, 9u);
+  EXPECT_EQ(room_.states[0].blow_impulse_N_s, 2.8);
+}
+
 TEST_F(TelemetryWorkerTest, SendsNothingAfterTheClientsEnd) {
   end_.give_up({ErrorCode::unavailable, "gone"});
   push(1, kForbidden, 0.0);

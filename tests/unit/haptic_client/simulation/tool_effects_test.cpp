@@ -533,7 +533,8 @@ TEST(ToolEffects, ABroachGoesByBlows) {
   Rig rig(slab(20.0, 0.6, 0.5, 50.0), broach, params);
   rig.move({0, 0, 6.0}, 3.0);
   int blows = 0;
-  for (const Stretch& run : runs_of(rig.move({0, 0, 8.5}, 6.0))) {
+  const std::vector<LoopReport> reports = rig.move({0, 0, 8.5}, 6.0);
+  for (const Stretch& run : runs_of(reports)) {
     const double advance_mm = 3920.0 / (130.0 * (0.6 / 1.9) * (0.6 / 1.9) * section_mm2(run.from_mm));
     std::printf("  a blow at %.2f mm: %.3f mm in %d ms, by hand %.3f mm\n", run.from_mm, run.way_mm, run.ticks,
                 advance_mm);
@@ -544,6 +545,12 @@ TEST(ToolEffects, ABroachGoesByBlows) {
     ++blows;
   }
   EXPECT_EQ(blows, 6);  // 60 a minute
+  EXPECT_EQ(reports.back().cutting.blows - reports.front().cutting.blows, 6u);
+  for (const LoopReport& r : {reports.front(), reports.back()}) {
+    const double resistance_n = 130.0 * (0.6 / 1.9) * (0.6 / 1.9) * section_mm2(r.pose_bone_proxy.position_mm.z());
+    EXPECT_NEAR(r.cutting.seated, 0.1 * resistance_n / 3920.0, 0.08 * 0.1 * resistance_n / 3920.0);
+  }
+  EXPECT_GT(reports.back().cutting.seated, reports.front().cutting.seated);
   rig.spindle(0.0);
   rig.move(Vec3::Zero(), 1.0);  // it runs down, and its points, slightly within its faces, come to rest
   double way = 0.0;
@@ -572,6 +579,8 @@ TEST(ToolEffects, ABroachStopsWhenSeated) {
   std::printf("  seated %.2f mm deep after %zu blows, its section %.1f mm2, by hand %.1f mm2; %.1f N of push\n",
               deep_mm, runs.size(), section_mm2(deep_mm), seat_mm2, last.coupling.force_n.norm());
   EXPECT_NEAR(section_mm2(deep_mm), seat_mm2, 0.08 * seat_mm2);  // as above
+  EXPECT_EQ(last.cutting.seated, 1.0);
+  EXPECT_EQ(last.cutting.blow_impulse_n_s, 2.8);
   EXPECT_GT(last.coupling.force_n.norm(), 20.0);
 }
 
