@@ -30,6 +30,7 @@ struct SoundReport {
   double buffer_ms = 0;      // duration of a buffer; a longer computation makes a gap
   double latency_ms = 0;     // from a state of the tool to its sound, upper bound
   double gaps = 0;           // since the start
+  double late_callbacks = 0;  // since the start: calls that came more than a buffer late, heard or not
   std::string device{};      // that plays it, such as PulseAudio; empty: none
   std::string trouble{};     // one sentence, such as why there is no device; empty: none
   friend bool operator==(const SoundReport&, const SoundReport&) = default;
