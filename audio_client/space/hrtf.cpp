@@ -30,7 +30,7 @@ class Separator {
   explicit Separator(double rate_hz)
       : fft_(kTransform), response_(fft_.bins()), minimum_(fft_.bins()), time_(kTransform), rate_hz_(rate_hz) {}
 
-  // The folded cepstrum of the magnitudes gives the minimum phase (Oppenheim and Schafer). The delay is where the
+  // The folded cepstrum of the magnitudes gives the minimum phase (Oppenheim 1989). The delay is where the
   // response and its own minimum-phase form are most alike.
   Separated separated(std::span<const float> response) {
     std::ranges::fill(time_, 0.0F);

@@ -11,6 +11,8 @@ namespace {
 
 // Nearer than a quarter of the reference distance, a tool becomes no louder than by 12 dB.
 constexpr double kLeastOfReference = 0.25;
+// No place in a room, but an error of a state.
+constexpr double kElsewhere_mm = 1e5;
 // Turns by less keep their filter: 0.2 degrees, a fifth of what listeners tell apart straight ahead.
 constexpr double kSameDirection = 0.0035;
 
@@ -41,14 +43,14 @@ void SoundPath::prepare(const Space& space, double rate_hz) noexcept {
 void SoundPath::start(const Vec3& position_mm) noexcept {
   line_.clear();
   left_ = right_ = Ear{};
-  if (position_mm.allFinite()) target_mm_ = position_mm;
+  aim(position_mm);
   followed_mm_ = position_mm_ = target_mm_;
   begun_ = false;
   silent_frames_ = kLongest;
 }
 
 void SoundPath::aim(const Vec3& position_mm) noexcept {
-  if (position_mm.allFinite()) target_mm_ = position_mm;
+  if ((position_mm.array().abs() < kElsewhere_mm).all()) target_mm_ = position_mm;  // not for NaN either
 }
 
 SoundPath::Place SoundPath::place() const noexcept {

@@ -24,7 +24,7 @@ class SoundPath {
   void prepare(const Space& space, double rate_hz) noexcept;  // silences
   // The source begins here, and what was under way is forgotten. [audio]
   void start(const Vec3& position_mm) noexcept;
-  // It moves here; a position that is not finite is ignored. [audio]
+  // It moves here; a position that is not finite, or beyond 100 m, is ignored. [audio]
   void aim(const Vec3& position_mm) noexcept;
   // The next kBlockFrames of the source in, and what is heard of it added. [audio]
   void add_to(const Block& source, StereoBlock& heard) noexcept;

@@ -1,14 +1,12 @@
 #include "tests/unit/audio_client/ideal_head.hpp"
 
 #include <cmath>
-#include <numbers>
+#include <utility>
 
 #include "audio_client/space/listener.hpp"
 
 namespace osteon::test {
 namespace {
-
-constexpr double kPi = std::numbers::pi;
 
 // An impulse between samples: a sinc of 64 samples under a Hann window.
 std::vector<float> impulse(double at, double level) {

@@ -1,15 +1,17 @@
 // Heads whose ears are known by formula, as if they had been measured.
 #pragma once
 #include <functional>
+#include <numbers>
 #include <vector>
 
 #include "audio_client/space/hrtf.hpp"
 
 namespace osteon::test {
 
+inline constexpr double kPi = std::numbers::pi;
 inline constexpr double kHeadRadius_mm = 87.5;  // Woodworth's and Kuhn's
 
-// Woodworth's delay of an ear of a rigid sphere for a far source, from the moment at which its sound would reach the
+// The delay of an ear of a rigid sphere (Woodworth 1938) for a far source, from the moment at which its sound would reach the
 // middle. `along`: cosine of the angle between source and ear. The near ear is reached straight, and the far one round
 // the sphere.
 [[nodiscard]] double woodworth_delay_s(double along);

@@ -17,11 +17,13 @@
 #include "common/sound/levels.hpp"
 #include "common/sound/tones.hpp"
 #include "tests/unit/audio_client/ideal_head.hpp"
+#include "tests/unit/audio_client/scripted_drilling.hpp"
 
 namespace osteon::audio {
 namespace {
 
-constexpr double kRate_hz = 48000, kPi = std::numbers::pi;
+using test::kPi;
+using test::kRate_hz;
 
 // A head at the origin that looks along x, with z up.
 Space space_of(Listening listening, const test::EarLevel& level = [](double) { return 1.0; }) {
@@ -77,14 +79,15 @@ double rms(std::span<const float> samples) { return std::pow(10, sound::rms_db(s
 class BothWays : public testing::TestWithParam<Listening> {};
 INSTANTIATE_TEST_SUITE_P(Listening, BothWays, testing::Values(Listening::loudspeakers, Listening::headphones));
 
-// Pressure falls as 1 / distance: 6.02 dB for each doubling. At the reference distance the source has its own level.
+// Pressure falls as 1 / distance: 6.02 dB for each doubling. At the reference distance the source has its own level. An
+// ideal head keeps the power of noise up to 23 kHz, so a tone has 0.13 dB more.
 TEST_P(BothWays, LevelFallsBySixDecibelsWithEachDoubling) {
   const Space space = space_of(GetParam());
   const double own_db = 20 * std::log10(std::numbers::sqrt2 / 2);
   for (const double times : {0.5, 1.0, 2.0, 4.0, 8.0}) {
     const Vec3 at_mm = round_head(0, times * reference_mm(GetParam()));
     const Heard heard = hear(space, tone(1000), still(at_mm), 0.3);
-    EXPECT_NEAR(20 * std::log10(rms(heard.left)), own_db - 20 * std::log10(times), 0.1) << times;
+    EXPECT_NEAR(20 * std::log10(rms(heard.left)), own_db - 20 * std::log10(times), 0.2) << times;
     EXPECT_NEAR(rms(heard.left), rms(heard.right), 1e-4) << "from ahead";
   }
   // Near the listener the level is bounded, and far away too.
@@ -92,7 +95,7 @@ TEST_P(BothWays, LevelFallsBySixDecibelsWithEachDoubling) {
     return rms(hear(space, tone(1000), still(round_head(0, distance_mm)), 0.3).left);
   };
   EXPECT_NEAR(level(1), level(0.25 * reference_mm(GetParam())), 1e-4);
-  EXPECT_NEAR(level(1e9), level(kFarthest_mm), 1e-6);
+  EXPECT_NEAR(level(5e4), level(kFarthest_mm), 1e-6);
 }
 
 // Distances of whole frames: the impulse stays one, and arrives at distance / speed of sound.
@@ -121,8 +124,9 @@ TEST_P(BothWays, DelaysBetweenFramesAreHeardInThePhase) {
       re += heard.left[n] * std::sin(angle);
       im += heard.left[n] * std::cos(angle);
     }
-    // 1 us is a third of a millimetre. The filter of an ideal head is no exact impulse near 24 kHz.
-    EXPECT_NEAR(std::atan2(im, re) / (2 * kPi * 1000), 0, 1e-6) << distance_mm;
+    // 1 us is a third of a millimetre. The filter of an ideal head ends at 23 kHz, and its minimum phase has 2 us.
+    const double most_s = GetParam() == Listening::headphones ? 3e-6 : 0.3e-6;
+    EXPECT_NEAR(std::atan2(im, re) / (2 * kPi * 1000), 0, most_s) << distance_mm;
   }
 }
 
