@@ -17,12 +17,14 @@ void add_listening(CLI::App& command, ListeningOption& listening) {
   command.add_option("--hrtf", listening.hrtf,
                      "SOFA file of a head, for headphones; by default, the one that libmysofa comes with");
   command
-      .add_option("--listener", listening.listener_mm,
-                  "X Y Z of the listener, mm from the middle of the bone along the axes of its scan. The listener looks "
-                  "at the middle. By default, at the right side of a patient who lies on the back")
+      .add_option(
+          "--listener", listening.listener_mm,
+          "X Y Z of the listener, mm from the middle of the bone along the axes of its scan. The listener looks "
+          "at the middle. By default, at the right side of a patient who lies on the back")
       ->expected(3)
       ->check(number_in(-kFarthest_mm, kFarthest_mm));
-  command.add_option("--listener-up", listening.up, "X Y Z of a direction that is up for the listener; by default 0 -1 0")
+  command
+      .add_option("--listener-up", listening.up, "X Y Z of a direction that is up for the listener; by default 0 -1 0")
       ->expected(3)
       ->check(number_in(-1e6, 1e6));
 }

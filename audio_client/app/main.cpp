@@ -229,8 +229,8 @@ Result<void> run(const Options& options, const StopSignal& stop) {
   StateLog states;
   if (Result<void> opened = states.open(options.state_log_file); !opened) return opened;
   if (!options.wav_file.empty()) {
-    Result<audio::WavRecorder> opened = audio::WavRecorder::open(
-        options.wav_file, output_params.rate_hz, space->listening == audio::Listening::mono ? 1 : 2);
+    Result<audio::WavRecorder> opened = audio::WavRecorder::open(options.wav_file, output_params.rate_hz,
+                                                                 space->listening == audio::Listening::mono ? 1 : 2);
     if (!opened) return tl::unexpected(opened.error());
     recorder = std::move(*opened);
     engine.record_to(*recorder);
@@ -316,7 +316,8 @@ int main(int argc, char** argv) {
   app.add_option("--device", options.device,
                  "Name or number of a sink, as osteon-audio devices lists them; by default, the server's own choice");
   audio::add_listening(app, options.listening);
-  app.add_option("--wav", options.wav_file, "Record the sound: 48 kHz, 16 bit, both channels, or one with --listen mono");
+  app.add_option("--wav", options.wav_file,
+                 "Record the sound: 48 kHz, 16 bit, both channels, or one with --listen mono");
   app.add_option("--state-log", options.state_log_file,
                  "CSV: when each cutting state was received and when it was played");
   app.add_option("--summary", options.summary_file, "JSON written at the end: frames, latencies, callback work, peak");

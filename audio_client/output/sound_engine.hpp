@@ -65,7 +65,9 @@ class SoundEngine final : public SoundSource {
   // When the first frame was rendered, steady clock; 0 before. A recording begins with that frame.
   [[nodiscard]] std::int64_t first_frame_ns() const noexcept { return first_frame_ns_.load(std::memory_order_relaxed); }
   // The largest amplitude, at full volume, of a channel: 0 left, 1 right; and of both.
-  [[nodiscard]] float peak(std::size_t channel) const noexcept { return peaks_[channel].load(std::memory_order_relaxed); }
+  [[nodiscard]] float peak(std::size_t channel) const noexcept {
+    return peaks_[channel].load(std::memory_order_relaxed);
+  }
   [[nodiscard]] float peak() const noexcept { return std::max(peak(0), peak(1)); }
   // Duration of the work of one render(). Call only after the output was stopped.
   [[nodiscard]] const DurationHistogram& work() const noexcept { return work_; }

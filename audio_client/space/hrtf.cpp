@@ -13,11 +13,11 @@ namespace osteon::audio {
 namespace {
 
 constexpr int kTransform = 2 * Hrtf::kMostTaps;
-constexpr float kDeepest = 1e-4F;    // a notch below the loudest line, of which minimum phase would make a long tone
+constexpr float kDeepest = 1e-4F;       // a notch below the loudest line, of which minimum phase would make a long tone
 constexpr double kDelayBand_hz = 3000;  // where ears compare times; beyond, the far ear hears round both sides
-constexpr int kFade = 16;            // taps in which a filter that is cut short fades out
+constexpr int kFade = 16;               // taps in which a filter that is cut short fades out
 constexpr std::size_t kNeighbours = 3;
-constexpr double kAsNear = 1.001;    // files have directions as single floats
+constexpr double kAsNear = 1.001;  // files have directions as single floats
 
 // An impulse response as a delay and a filter of minimum phase.
 struct Separated {
@@ -120,9 +120,7 @@ EarPair interpolated(const std::vector<Measurement>& measured, const Vec3& direc
   return ears;
 }
 
-double energy(const EarFilter& filter) {
-  return std::inner_product(filter.begin(), filter.end(), filter.begin(), 0.0);
-}
+double energy(const EarFilter& filter) { return std::inner_product(filter.begin(), filter.end(), filter.begin(), 0.0); }
 
 bool usable(std::span<const float> response) {
   return !response.empty() && response.size() <= Hrtf::kMostTaps &&
@@ -140,16 +138,17 @@ Result<Hrtf> Hrtf::make(std::span<const HeadResponse> measured, double rate_hz) 
     if (!one.towards.allFinite() || one.towards.norm() < 1e-9)
       return failure(ErrorCode::invalid_input, "a direction is no direction");
     if (!usable(one.left) || !usable(one.right))
-      return failure(ErrorCode::invalid_input, "a response is empty, not finite, or longer than " +
-                                                   std::to_string(kMostTaps) + " samples");
+      return failure(ErrorCode::invalid_input,
+                     "a response is empty, not finite, or longer than " + std::to_string(kMostTaps) + " samples");
     parts.push_back({one.towards.normalized(), separator.separated(one.left), separator.separated(one.right)});
   }
   Hrtf made;
   for (int e = 0; e < kElevations; ++e) {
     for (int a = 0; a < kAzimuths; ++a) {
-      const double up = (e * kStep_degrees - 90) * std::numbers::pi / 180, round = a * kStep_degrees * std::numbers::pi / 180;
-      made.nodes_.push_back(interpolated(
-          parts, {std::cos(up) * std::cos(round), std::cos(up) * std::sin(round), std::sin(up)}, rate_hz));
+      const double up = (e * kStep_degrees - 90) * std::numbers::pi / 180,
+                   round = a * kStep_degrees * std::numbers::pi / 180;
+      made.nodes_.push_back(
+          interpolated(parts, {std::cos(up) * std::cos(round), std::cos(up) * std::sin(round), std::sin(up)}, rate_hz));
     }
   }
   const EarPair ahead = made.nodes_[static_cast<std::size_t>((kElevations / 2) * kAzimuths)];

@@ -28,7 +28,8 @@ std::vector<HeadResponse> responses(const MYSOFA_HRTF& sofa) {
       const std::size_t which = sofa.DataDelay.elements == 2 ? ear : 2 * m + ear;
       const float delay = which < sofa.DataDelay.elements ? sofa.DataDelay.values[which] : 0.0F;
       std::vector<float>& response = ear == 0 ? heard[m].left : heard[m].right;
-      if (delay > 0.0F && delay <= static_cast<float>(Hrtf::kMostTaps)) response.assign(static_cast<std::size_t>(delay + 0.5F), 0.0F);
+      if (delay > 0.0F && delay <= static_cast<float>(Hrtf::kMostTaps))
+        response.assign(static_cast<std::size_t>(delay + 0.5F), 0.0F);
       const float* first = sofa.DataIR.values + (2 * m + ear) * sofa.N;
       response.insert(response.end(), first, first + sofa.N);
     }

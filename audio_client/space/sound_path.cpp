@@ -54,7 +54,8 @@ void SoundPath::aim(const Vec3& position_mm) noexcept {
 }
 
 SoundPath::Place SoundPath::place() const noexcept {
-  const Vec3 offset_mm = space_.pose_bone_head.rotation.conjugate() * (position_mm_ - space_.pose_bone_head.position_mm);
+  const Vec3 offset_mm =
+      space_.pose_bone_head.rotation.conjugate() * (position_mm_ - space_.pose_bone_head.position_mm);
   const double apart_mm = offset_mm.norm();
   const double least_mm = kLeastOfReference * reference_mm(space_.listening);
   Place here;
@@ -73,8 +74,8 @@ void SoundPath::advance(double& receding_mm_per_s) noexcept {
   receding_mm_per_s = begun_ ? (place().distance_mm - before_mm) / block_s : 0.0;
 }
 
-// What arrives now left the source when it was elsewhere: D = d(t - D) / c, so D = d / (c + d') for a steady motion. The
-// pitch is then that of Doppler, c / (c + d'), with d' below 0 while the source comes nearer.
+// What arrives now left the source when it was elsewhere: D = d(t - D) / c, so D = d / (c + d') for a steady motion.
+// The pitch is then that of Doppler, c / (c + d'), with d' below 0 while the source comes nearer.
 double SoundPath::delay_frames(double distance_mm, double receding_mm_per_s, double later_s) const noexcept {
   const double speed = std::max(kSoundSpeed_mm_per_s + receding_mm_per_s, 0.5 * kSoundSpeed_mm_per_s);
   return std::clamp((distance_mm / speed + later_s) * rate_hz_, DelayLine::kLeast, DelayLine::kMost);
@@ -106,7 +107,8 @@ void SoundPath::add_panned(const Place& here, double receding_mm_per_s, StereoBl
   const double angle = 0.25 * std::numbers::pi * (1.0 + here.aside);
   const double level = std::numbers::sqrt2 * reference_mm(space_.listening) / here.distance_mm;
   const double delay = delay_frames(here.distance_mm, receding_mm_per_s, 0.0);
-  const auto to_left = static_cast<float>(level * std::sin(angle)), to_right = static_cast<float>(level * std::cos(angle));
+  const auto to_left = static_cast<float>(level * std::sin(angle)),
+             to_right = static_cast<float>(level * std::cos(angle));
   if (!begun_) {
     left_.delay = delay;
     left_.gain = to_left;

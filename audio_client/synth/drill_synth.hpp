@@ -28,8 +28,8 @@ class DrillSynth {
   // way to the listener, except in mono.
   static constexpr int kLatency_frames = kBlockFrames;
 
-  void prepare(const SynthParams& params);  // may allocate; silences
-  void reset() noexcept;                    // [audio] silent at once, as after prepare
+  void prepare(const SynthParams& params);   // may allocate; silences
+  void reset() noexcept;                     // [audio] silent at once, as after prepare
   void listen(const Space& space) noexcept;  // from another place from now on; silent at once
 
   // [audio] Takes effect with the next block. A tool that is not in the scene runs down and falls silent.
@@ -57,7 +57,7 @@ class DrillSynth {
   std::array<Handpiece, kHandpieceKinds> handpieces_;
   std::array<Voice, kVoices> voices_;
   std::array<SoundPath, kVoices> paths_;  // of each voice to the listener
-  SuctionSound suction_;  // one for all suckers of the room, heard from the first of them
+  SuctionSound suction_;                  // one for all suckers of the room, heard from the first of them
   SoundPath suction_path_;
   Limiter limiter_;
   StereoBlock block_;

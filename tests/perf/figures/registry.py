@@ -106,7 +106,7 @@ FIGURES = [
            "analysis, without files", "sound_analysis", (">=", 20.0)),
     *[Figure(f"sound_binaural_{name}_speed", "times_real_time", f"length of a scripted drilling over the processor's "
              f"time of its synthesis for headphones, with a tool that {what}", "sound_binaural", (">=", 100.0))
-      for name, what in (("still", "stays at one place"), ("moving", "turns, so that both filters change in each block"))],
+      for name, what in (("still", "stays at one place"), ("moving", "turns, and its filters in each block"))],
     Figure("sound_model_speed", "times_real_time", "length of the same recording over the processor's time of its "
            "spectral model, without refinement", "sound_model", (">=", 20.0)),
     Figure("sound_model_refined_speed", "times_real_time", "the same with two rounds of refinement", "sound_model",

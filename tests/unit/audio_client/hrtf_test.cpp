@@ -49,8 +49,7 @@ double gain(const EarFilter& filter, double hz) {
 
 double largest_difference(const EarFilter& a, const EarFilter& b) {
   double largest = 0;
-  for (std::size_t i = 0; i < a.size(); ++i)
-    largest = std::max(largest, static_cast<double>(std::abs(a[i] - b[i])));
+  for (std::size_t i = 0; i < a.size(); ++i) largest = std::max(largest, static_cast<double>(std::abs(a[i] - b[i])));
   return largest;
 }
 
@@ -93,7 +92,8 @@ TEST(Hrtf, IsContinuousAllRoundAndOverThePoles) {
   constexpr double kStep = 0.1;  // degrees
   const auto apart = [&](const Vec3& one, const Vec3& other) {
     const EarPair a = ears(*hrtf, one), b = ears(*hrtf, other);
-    return std::max(largest_difference(a.left.filter, b.left.filter), largest_difference(a.right.filter, b.right.filter));
+    return std::max(largest_difference(a.left.filter, b.left.filter),
+                    largest_difference(a.right.filter, b.right.filter));
   };
   // The level changes by at most 0.45 / 0.55 in a radian. An interpolated one is steeper by less than a half.
   const double most = 1.5 * 0.45 / 0.55 * kStep * kPi / 180;
@@ -107,7 +107,8 @@ TEST(Hrtf, IsContinuousAllRoundAndOverThePoles) {
 void expect_symmetric(const Hrtf& hrtf) {
   for (double azimuth = 0; azimuth <= 180; azimuth += 7.3) {
     for (const double elevation : {-80.0, -35.0, -3.0, 0.0, 22.0, 64.0, 90.0}) {
-      const EarPair here = ears(hrtf, direction(azimuth, elevation)), there = ears(hrtf, direction(-azimuth, elevation));
+      const EarPair here = ears(hrtf, direction(azimuth, elevation)),
+                    there = ears(hrtf, direction(-azimuth, elevation));
       EXPECT_NEAR(here.left.delay_s, there.right.delay_s, 1e-7) << azimuth << " " << elevation;
       EXPECT_NEAR(here.right.delay_s, there.left.delay_s, 1e-7) << azimuth << " " << elevation;
       EXPECT_LT(largest_difference(here.left.filter, there.right.filter), 1e-4) << azimuth << " " << elevation;

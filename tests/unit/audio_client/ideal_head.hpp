@@ -11,9 +11,9 @@ namespace osteon::test {
 inline constexpr double kPi = std::numbers::pi;
 inline constexpr double kHeadRadius_mm = 87.5;  // Woodworth's and Kuhn's
 
-// The delay of an ear of a rigid sphere (Woodworth 1938) for a far source, from the moment at which its sound would reach the
-// middle. `along`: cosine of the angle between source and ear. The near ear is reached straight, and the far one round
-// the sphere.
+// The delay of an ear of a rigid sphere (Woodworth 1938) for a far source, from the moment at which its sound would
+// reach the middle. `along`: cosine of the angle between source and ear. The near ear is reached straight, and the far
+// one round the sphere.
 [[nodiscard]] double woodworth_delay_s(double along);
 
 // Level of an ear, by the same cosine.

@@ -235,10 +235,10 @@ TEST(RestartedServer, IsPlayedToAgain) {
 
   test::ProcessOptions home;
   home.environment = {{"HOME", folder}};
-  const test::Process server("pulseaudio",
-                             {"-n", "-F", std::string(folder) + "/null.pa", "--daemonize=no", "--exit-idle-time=-1",
-                              "--use-pid-file=no"},
-                             home);
+  const test::Process server(
+      "pulseaudio",
+      {"-n", "-F", std::string(folder) + "/null.pa", "--daemonize=no", "--exit-idle-time=-1", "--use-pid-file=no"},
+      home);
   ASSERT_TRUE(test::wait_until(
       [&] {
         output.maintain(Clock::now(), true);

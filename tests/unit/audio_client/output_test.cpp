@@ -260,8 +260,11 @@ TEST(PulseOutput, MissingSoundServerIsOneSentenceWithTheRemedy) {
 }
 
 TEST(OutputDevice, IsChosenByNameByNumberOrByTheServer) {
-  const std::vector<OutputDevice> sinks{{"Screen", 2, 48000, false}, {"Desk", 2, 44100, true}, {"1", 2, 48000, false},
-                                        {"Twin", 2, 48000, false},   {"Twin", 6, 48000, false}};
+  const std::vector<OutputDevice> sinks{{"Screen", 2, 48000, false},
+                                        {"Desk", 2, 44100, true},
+                                        {"1", 2, 48000, false},
+                                        {"Twin", 2, 48000, false},
+                                        {"Twin", 6, 48000, false}};
   EXPECT_EQ(*chosen_device(sinks, ""), 1U);
   EXPECT_EQ(*chosen_device(sinks, "Screen"), 0U);
   EXPECT_EQ(*chosen_device(sinks, "4"), 4U);

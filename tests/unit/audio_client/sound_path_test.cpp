@@ -26,7 +26,8 @@ using test::kPi;
 using test::kRate_hz;
 
 // A head at the origin that looks along x, with z up.
-Space space_of(Listening listening, const test::EarLevel& level = [](double) { return 1.0; }) {
+Space space_of(
+    Listening listening, const test::EarLevel& level = [](double) { return 1.0; }) {
   Space space;
   space.listening = listening;
   if (listening == Listening::headphones)
@@ -147,8 +148,8 @@ TEST_P(BothWays, MovingSourcesHaveDopplersPitch) {
   }
 }
 
-// States come 120 times a second. The steps between them must not be heard as a wobble: of a tone that moves at 0.5 m/s,
-// sidebands at 120 Hz stay 40 dB below it.
+// States come 120 times a second. The steps between them must not be heard as a wobble: of a tone that moves at 0.5
+// m/s, sidebands at 120 Hz stay 40 dB below it.
 TEST_P(BothWays, StepsBetweenStatesMakeNoSidebands) {
   const auto place = [](double t) { return round_head(0, 800 - 500 * std::floor(t * 120) / 120); };
   const Heard heard = hear(space_of(GetParam()), tone(4000), place, 0.9);
@@ -174,10 +175,11 @@ TEST_P(BothWays, AMirroredSourceIsHeardWithTheSidesExchanged) {
   }
 }
 
-// A source that jumps across the head in one block: its delay changes by up to Woodworth's d = 2 a / c (pi / 4 + 1 / 2),
-// so for a block the tone has a frequency of at most w (1 + d rate / 64); its level moves by at most 1 in 64 frames, and
-// so do the filters. The second difference of g x is at most g x'' + 2 g' x', and at the ends of the block the slopes of
-// g and of the phase jump once. A filter that was exchanged at once would add a step of 0.9 of the amplitude.
+// A source that jumps across the head in one block: its delay changes by up to Woodworth's d = 2 a / c (pi / 4 + 1 /
+// 2), so for a block the tone has a frequency of at most w (1 + d rate / 64); its level moves by at most 1 in 64
+// frames, and so do the filters. The second difference of g x is at most g x'' + 2 g' x', and at the ends of the block
+// the slopes of g and of the phase jump once. A filter that was exchanged at once would add a step of 0.9 of the
+// amplitude.
 TEST_P(BothWays, ASourceThatJumpsMakesNoStep) {
   constexpr double kTone_hz = 300;
   Space space = space_of(GetParam(), [](double along) { return 0.55 + 0.45 * along; });
@@ -282,7 +284,8 @@ TEST_P(BothWays, EndsInSilenceWhenAllHasArrived) {
 
 TEST_P(BothWays, ImpossiblePositionsAndSpeedsStayBounded) {
   const double nan = std::numeric_limits<double>::quiet_NaN(), inf = std::numeric_limits<double>::infinity();
-  const std::vector<Vec3> places{{0, 0, 0}, {nan, 0, 0}, {1e300, 0, 0}, {0, -inf, 0}, {0, 0, 1e6}, {1e-9, 0, 0}, {-5000, 0, 0}};
+  const std::vector<Vec3> places{{0, 0, 0},   {nan, 0, 0},  {1e300, 0, 0}, {0, -inf, 0},
+                                 {0, 0, 1e6}, {1e-9, 0, 0}, {-5000, 0, 0}};
   const auto place = [&](double t) { return places[static_cast<std::size_t>(t * 400) % places.size()]; };
   const Heard heard = hear(space_of(GetParam()), tone(2000), place, 0.2);
   // 12 dB for what is near, and 3 dB for what is all at one side.
