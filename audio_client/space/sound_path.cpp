@@ -65,13 +65,13 @@ SoundPath::Place SoundPath::place() const noexcept {
   return here;
 }
 
-void SoundPath::advance(double& receding_mm_per_s) noexcept {
+double SoundPath::advance() noexcept {
   const double block_s = kBlockFrames / rate_hz_;
   const double share = space_.smoothing_s > 0 ? 1.0 - std::exp(-block_s / space_.smoothing_s) : 1.0;
   const double before_mm = place().distance_mm;
   followed_mm_ += share * (target_mm_ - followed_mm_);
   position_mm_ += share * (followed_mm_ - position_mm_);
-  receding_mm_per_s = begun_ ? (place().distance_mm - before_mm) / block_s : 0.0;
+  return begun_ ? (place().distance_mm - before_mm) / block_s : 0.0;
 }
 
 // What arrives now left the source when it was elsewhere: D = d(t - D) / c, so D = d / (c + d') for a steady motion.
@@ -92,8 +92,7 @@ void SoundPath::add_to(const Block& source, StereoBlock& heard) noexcept {
   const bool silent = std::ranges::all_of(source, [](float x) { return x == 0.0F; });
   silent_frames_ = silent ? std::min(kLongest, silent_frames_ + kBlockFrames) : 0;
   line_.push(source);
-  double receding_mm_per_s = 0;
-  advance(receding_mm_per_s);
+  const double receding_mm_per_s = advance();
   const Place here = place();
   if (space_.listening == Listening::headphones)
     add_by_ears(here, receding_mm_per_s, heard);

@@ -47,7 +47,8 @@ class SoundPath {
 
   [[nodiscard]] Place place() const noexcept;
   [[nodiscard]] double delay_frames(double distance_mm, double receding_mm_per_s, double later_s) const noexcept;
-  void advance(double& receding_mm_per_s) noexcept;
+  // Follows the target for a block. Returns by how much the distance grows, mm/s.
+  double advance() noexcept;
   void add_panned(const Place& here, double receding_mm_per_s, StereoBlock& heard) noexcept;
   void add_by_ears(const Place& here, double receding_mm_per_s, StereoBlock& heard) noexcept;
 
