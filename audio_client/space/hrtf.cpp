@@ -13,7 +13,7 @@ namespace osteon::audio {
 namespace {
 
 constexpr int kTransform = 2 * Hrtf::kMostTaps;
-constexpr float kDeepest = 1e-4F;       // a notch below the loudest line, of which minimum phase would make a long tone
+constexpr float kDeepest = 1e-2F;       // a notch below the loudest line, of which minimum phase would make a long tone
 constexpr double kDelayBand_hz = 3000;  // where ears compare times; beyond, the far ear hears round both sides
 constexpr int kFade = 16;               // taps in which a filter that is cut short fades out
 constexpr std::size_t kNeighbours = 3;

@@ -63,11 +63,12 @@ TEST(Hrtf, MeasuredDirectionsComeBack) {
       // A fiftieth of a sample: the parabola through three samples of the correlation.
       EXPECT_NEAR(heard.left.delay_s, woodworth_delay_s(towards.y()), 0.02 / 48000) << azimuth << " " << elevation;
       EXPECT_NEAR(heard.right.delay_s, woodworth_delay_s(-towards.y()), 0.02 / 48000) << azimuth << " " << elevation;
-      // The level ahead is 0.55 in both ears, and becomes 1. The impulses end near 23 kHz, so their power is 3 % less
-      // than their level says.
+      // The level ahead is 0.55 in both ears, and becomes 1.
       for (const double hz : {200.0, 1000.0, 5000.0, 12000.0}) {
-        EXPECT_NEAR(gain(heard.left.filter, hz) * 0.55 / shadowed(towards.y()), 1, 0.03) << azimuth << " " << hz;
-        EXPECT_NEAR(gain(heard.right.filter, hz) * 0.55 / shadowed(-towards.y()), 1, 0.03) << azimuth << " " << hz;
+        EXPECT_NEAR(gain(heard.left.filter, hz) * 0.55 / shadowed(towards.y()), test::kToneGain, 0.01)
+            << azimuth << " " << hz;
+        EXPECT_NEAR(gain(heard.right.filter, hz) * 0.55 / shadowed(-towards.y()), test::kToneGain, 0.01)
+            << azimuth << " " << hz;
       }
     }
   }

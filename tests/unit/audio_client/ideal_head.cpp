@@ -4,18 +4,19 @@
 #include <utility>
 
 #include "audio_client/space/listener.hpp"
+#include "tests/unit/audio_client/scripted_drilling.hpp"
 
 namespace osteon::test {
 namespace {
 
-// An impulse between samples: a sinc of 64 samples under a Hann window.
+// An impulse between samples, without what is above kImpulse_hz: a sinc of 160 samples under a Hann window.
 std::vector<float> impulse(double at, double level) {
-  constexpr double kHalf = 32;
+  constexpr double kHalf = 80, kShare = 2 * kImpulse_hz / kRate_hz;
   std::vector<float> samples(256);
   for (std::size_t i = 0; i < samples.size(); ++i) {
     const double x = static_cast<double>(i) - at;
     if (std::abs(x) >= kHalf) continue;
-    const double sinc = std::abs(x) < 1e-9 ? 1.0 : std::sin(kPi * x) / (kPi * x);
+    const double sinc = std::abs(x) < 1e-9 ? kShare : std::sin(kPi * kShare * x) / (kPi * x);
     samples[i] = static_cast<float>(level * sinc * (0.5 + 0.5 * std::cos(kPi * x / kHalf)));
   }
   return samples;
@@ -29,7 +30,7 @@ double woodworth_delay_s(double along) {
 }
 
 std::vector<audio::HeadResponse> sphere(const EarLevel& level) {
-  constexpr double kRate_hz = 48000, kBefore_s = 0.001;
+  constexpr double kBefore_s = 0.002;
   std::vector<audio::HeadResponse> measured;
   for (int up = -90; up <= 90; up += 10) {
     for (int round = 0; round < 360; round += 10) {
