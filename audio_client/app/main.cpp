@@ -18,6 +18,8 @@
 #include <utility>
 
 #include "audio_client/app/analyse_command.hpp"
+#include "audio_client/app/devices_command.hpp"
+#include "audio_client/app/listening_option.hpp"
 #include "audio_client/app/model_command.hpp"
 #include "audio_client/net/state_subscription.hpp"
 #include "audio_client/output/audio_output.hpp"
@@ -50,7 +52,8 @@ constexpr auto kRunDown = 2s;
 struct Options {
   std::string server, room, name = "audio";
   wire::CredentialArguments credentials;
-  std::string output = "pulse";
+  std::string output = "pulse", device;
+  audio::ListeningOption listening;
   std::filesystem::path wav_file, state_log_file, summary_file, window;
   double patience_s = 5;
 };
@@ -58,7 +61,8 @@ struct Options {
 // Rows of the state log, and the latency computed from them.
 //
 // sounded_mono_ns is a sum. It begins with the start of the render() call that first used the state. The frames that
-// the synthesis looks ahead are added (64, 1.3 ms). The output's latency is added: all buffers in front of the card,
+// the synthesis looks ahead are added (64, 1.3 ms), and the way of the sound to the usual listener (0.6 or 1.5 ms; none
+// in mono). The output's latency is added: all buffers in front of the card,
 // full (4 x 256 frames, 21.3 ms). On PulseAudio this is an upper bound; the monitor of a null sink receives a frame up
 // to one buffer earlier.
 class StateLog {
@@ -104,6 +108,7 @@ nlohmann::json summary_of(const Options& options, const audio::SoundEngine& engi
   const double peak = engine.peak();
   nlohmann::json summary = {
       {"output", options.output},
+      {"listen", options.listening.listen},
       {"frames", engine.frames()},
       // With the session log's mono_ns, this gives the position of a moment of the work in the recording.
       {"first_frame_mono_ns", engine.first_frame_ns() + output.latency().count()},
@@ -111,6 +116,7 @@ nlohmann::json summary_of(const Options& options, const audio::SoundEngine& engi
       // PulseAudio's own underruns do not reach RtAudio 5.2. These are the calls that came too late to fill the
       // buffers.
       {"gaps", output.gaps()},
+      {"late_callbacks", output.late_callbacks()},
       {"states_sounded", states.latency().count()},
       {"callback_work",
        {{"p50_us", engine.work().percentile_us(50)},
@@ -122,6 +128,8 @@ nlohmann::json summary_of(const Options& options, const audio::SoundEngine& engi
         {"max_ms", states.latency().max_us() / 1000}}},
       {"output_latency_ms", std::chrono::duration<double, std::milli>(output.latency()).count()},
       {"peak", peak},
+      {"peak_left", engine.peak(0)},
+      {"peak_right", engine.peak(1)},
       {"peak_db", peak > 0 ? nlohmann::json(20.0 * std::log10(peak)) : nlohmann::json(nullptr)},
   };
   if (recorder) {
@@ -164,6 +172,7 @@ class Window {
     report.rate_hz = rate_hz;
     report.trouble = output.trouble();
     report.gaps = static_cast<double>(output.gaps());
+    report.late_callbacks = static_cast<double>(output.late_callbacks());
     if (!report.trouble.empty()) return report;
     report.device = device_;
     for (const float x : engine.wave())
@@ -187,6 +196,9 @@ Result<void> run(const Options& options, const StopSignal& stop) {
   if (!kind) return tl::unexpected(kind.error());
   audio::OutputParams output_params;
   output_params.kind = *kind;
+  output_params.device = options.device;
+  if (!options.device.empty() && *kind != audio::OutputKind::pulse)
+    return failure(ErrorCode::invalid_input, "--device is a sink of PulseAudio; use --output pulse with it");
 
   // Errors on this machine are found before the server is contacted.
   if (Result<void> usable = check_writable(options.state_log_file, "the state log", "--state-log"); !usable)
@@ -195,6 +207,8 @@ Result<void> run(const Options& options, const StopSignal& stop) {
   std::optional<audio::WavRecorder> recorder;
   audio::SynthParams synth_params;
   synth_params.rate_hz = output_params.rate_hz;
+  Result<audio::Space> space = audio::read(options.listening, output_params.rate_hz);
+  if (!space) return tl::unexpected(space.error());
   audio::SoundEngine engine(synth_params);
   Result<Window> window = Window::connect(options);
   if (!window) return tl::unexpected(window.error());
@@ -215,11 +229,14 @@ Result<void> run(const Options& options, const StopSignal& stop) {
   StateLog states;
   if (Result<void> opened = states.open(options.state_log_file); !opened) return opened;
   if (!options.wav_file.empty()) {
-    Result<audio::WavRecorder> opened = audio::WavRecorder::open(options.wav_file, output_params.rate_hz);
+    Result<audio::WavRecorder> opened = audio::WavRecorder::open(options.wav_file, output_params.rate_hz,
+                                                                 space->listening == audio::Listening::mono ? 1 : 2);
     if (!opened) return tl::unexpected(opened.error());
     recorder = std::move(*opened);
     engine.record_to(*recorder);
   }
+  audio::move_to_bone(*space, room->bounds.centre_mm());
+  engine.listen(*space);
   if (output.opened())
     if (Result<void> started = output.start(); !started && !window->there()) return started;
   log::info("joined", {{"server", options.server}, {"case", room->case_title}, {"output", options.output}});
@@ -288,14 +305,19 @@ int main(int argc, char** argv) {
   std::function<Result<std::string>()> command;
   audio::add_analyse_command(app, command);
   audio::add_model_commands(app, command);
+  audio::add_devices_command(app, command);
   app.require_subcommand(0, 1);
   app.add_option("--server", options.server, "HOST:PORT of osteon-server; needed to play");
   app.add_option("--room", options.room, "Name of the room; not needed where the server has one");
   app.add_option("--name", options.name, "Who you are, shown to others")->capture_default_str();
   wire::add_credential_options(app, options.credentials);
-  app.add_option("--output", options.output, "pulse: PulseAudio's default sink; none: at the same pace to nowhere")
+  app.add_option("--output", options.output, "pulse: a sink of PulseAudio; none: at the same pace to nowhere")
       ->capture_default_str();
-  app.add_option("--wav", options.wav_file, "Record the sound: 48 kHz, 16 bit, mono");
+  app.add_option("--device", options.device,
+                 "Name or number of a sink, as osteon-audio devices lists them; by default, the server's own choice");
+  audio::add_listening(app, options.listening);
+  app.add_option("--wav", options.wav_file,
+                 "Record the sound: 48 kHz, 16 bit, both channels, or one with --listen mono");
   app.add_option("--state-log", options.state_log_file,
                  "CSV: when each cutting state was received and when it was played");
   app.add_option("--summary", options.summary_file, "JSON written at the end: frames, latencies, callback work, peak");

@@ -8,6 +8,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "common/core/result.hpp"
 
@@ -17,7 +18,8 @@ namespace osteon::audio {
 class SoundSource {
  public:
   virtual ~SoundSource() = default;
-  virtual void render(std::span<float> mono) noexcept = 0;  // [audio]
+  // Fills both channels, of equal sizes. [audio]
+  virtual void render(std::span<float> left, std::span<float> right) noexcept = 0;
 };
 
 enum class OutputKind { pulse, none };
@@ -28,6 +30,7 @@ struct OutputParams {
   unsigned rate_hz = 48000;
   unsigned frames = 256;  // in one buffer
   unsigned buffers = 4;   // ahead of the sound card; two left rare audible gaps on PulseAudio
+  std::string device;     // name of a sink, or its number in output_devices(); empty: the default one
 };
 
 class AudioOutput {
@@ -41,12 +44,30 @@ class AudioOutput {
   [[nodiscard]] virtual std::chrono::nanoseconds latency() const noexcept = 0;
   // Number of times that render() was called later than the duration of all buffers, so that the sound had a gap.
   [[nodiscard]] virtual std::uint64_t gaps() const noexcept = 0;
+  // Number of times that render() was called more than a buffer's duration late. Only those that are also gaps are
+  // heard.
+  [[nodiscard]] virtual std::uint64_t late_callbacks() const noexcept = 0;
   // Why no sound is played any more, as one sentence; empty while the output works.
   [[nodiscard]] virtual std::string failure_reason() const = 0;
 };
 
 // Opens the output without starting it. The source must outlive the output. Error: unavailable, with the remedy.
 [[nodiscard]] Result<std::unique_ptr<AudioOutput>> open_output(const OutputParams& params, SoundSource& source);
+
+// A sink of the sound server: all that RtAudio 5.2 tells of it. It does not tell the server's own short name, the
+// latency, or whether anything is plugged in.
+struct OutputDevice {
+  std::string name;  // the server's description, such as "Built-in Audio Analog Stereo"
+  unsigned channels = 0;
+  unsigned rate_hz = 0;  // at which it runs; other rates are converted by the server
+  bool is_default = false;
+};
+// In RtAudio's order. Error: unavailable, with the remedy.
+[[nodiscard]] Result<std::vector<OutputDevice>> output_devices();
+
+// The sink that `wanted` names, which may also be its number, from 0. Empty: the default one. Errors, invalid_input:
+// there is none, or several have this name.
+[[nodiscard]] Result<std::size_t> chosen_device(const std::vector<OutputDevice>& devices, const std::string& wanted);
 
 // The outputs that open_output() makes.
 [[nodiscard]] Result<std::unique_ptr<AudioOutput>> open_pulse_output(const OutputParams& params, SoundSource& source);

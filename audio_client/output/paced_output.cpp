@@ -13,7 +13,7 @@ namespace {
 class PacedOutput final : public AudioOutput {
  public:
   PacedOutput(const OutputParams& params, SoundSource& source)
-      : params_(params), source_(source), buffer_(params.frames, 0.0F) {}
+      : params_(params), source_(source), left_(params.frames, 0.0F), right_(params.frames, 0.0F) {}
   ~PacedOutput() override { stop(); }
 
   Result<void> start() override {
@@ -29,6 +29,7 @@ class PacedOutput final : public AudioOutput {
   // Nothing is queued behind this buffer: its first frame would leave at once.
   std::chrono::nanoseconds latency() const noexcept override { return {}; }
   std::uint64_t gaps() const noexcept override { return gaps_.load(std::memory_order_relaxed); }
+  std::uint64_t late_callbacks() const noexcept override { return late_.load(std::memory_order_relaxed); }
   std::string failure_reason() const override { return {}; }
 
  private:
@@ -46,15 +47,16 @@ class PacedOutput final : public AudioOutput {
         continue;
       }
       if (now - due > period * params_.buffers) gaps_.fetch_add(1, std::memory_order_relaxed);
-      source_.render(buffer_);
+      if (now - due > period) late_.fetch_add(1, std::memory_order_relaxed);
+      source_.render(left_, right_);
       due += period;
     }
   }
 
   OutputParams params_;
   SoundSource& source_;
-  std::vector<float> buffer_;
-  std::atomic<std::uint64_t> gaps_{0};
+  std::vector<float> left_, right_;
+  std::atomic<std::uint64_t> gaps_{0}, late_{0};
   std::jthread thread_;
 };
 

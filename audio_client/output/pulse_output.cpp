@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
+#include <utility>
 #include <vector>
 
 #include "audio_client/output/audio_output.hpp"
@@ -24,6 +25,32 @@ tl::unexpected<Error> no_server(const std::string& what) {
                  "no sound server answers (" + what + "); start PulseAudio, or use --output none with --wav FILE");
 }
 
+// RtAudio's view of the server. It lists the sources too, and numbers them together with the sinks.
+struct PulseDevices {
+  std::vector<OutputDevice> sinks;
+  std::vector<unsigned> ids;  // of the sinks
+};
+
+Result<std::unique_ptr<RtAudio>> pulse() {
+  auto audio = std::make_unique<RtAudio>(RtAudio::LINUX_PULSE);
+  if (audio->getCurrentApi() != RtAudio::LINUX_PULSE) return no_server("this RtAudio was built without PulseAudio");
+  audio->showWarnings(false);
+  return audio;
+}
+
+Result<PulseDevices> devices_of(RtAudio& audio) {
+  const unsigned count = audio.getDeviceCount();
+  if (count == 0) return no_server("it names no device");
+  PulseDevices devices;
+  for (unsigned id = 0; id < count; ++id) {
+    const RtAudio::DeviceInfo info = audio.getDeviceInfo(id);
+    if (info.outputChannels == 0) continue;
+    devices.sinks.push_back({info.name, info.outputChannels, info.preferredSampleRate, info.isDefaultOutput});
+    devices.ids.push_back(id);
+  }
+  return devices;
+}
+
 class PulseOutput final : public AudioOutput {
  public:
   PulseOutput(const OutputParams& params, SoundSource& source) : params_(params), source_(source) {}
@@ -31,14 +58,15 @@ class PulseOutput final : public AudioOutput {
 
   Result<void> open() {
     try {
-      audio_ = std::make_unique<RtAudio>(RtAudio::LINUX_PULSE);
-      if (audio_->getCurrentApi() != RtAudio::LINUX_PULSE)
-        return no_server("this RtAudio was built without PulseAudio");
-      audio_->showWarnings(false);
-      const unsigned devices = audio_->getDeviceCount();
-      if (devices == 0) return no_server("it names no device");
+      Result<std::unique_ptr<RtAudio>> audio = pulse();
+      if (!audio) return tl::unexpected(audio.error());
+      audio_ = std::move(*audio);
+      const Result<PulseDevices> devices = devices_of(*audio_);
+      if (!devices) return tl::unexpected(devices.error());
+      const Result<std::size_t> chosen = chosen_device(devices->sinks, params_.device);
+      if (!chosen) return tl::unexpected(chosen.error());
       RtAudio::StreamParameters to;
-      to.deviceId = std::min(audio_->getDefaultOutputDevice(), devices - 1);
+      to.deviceId = devices->ids[*chosen];
       to.nChannels = kChannels;
       RtAudio::StreamOptions options;
       options.numberOfBuffers = params_.buffers;  // 0 would let PulseAudio buffer 137 ms
@@ -80,6 +108,7 @@ class PulseOutput final : public AudioOutput {
     return std::chrono::nanoseconds(1'000'000'000LL * params_.frames * params_.buffers / params_.rate_hz);
   }
   std::uint64_t gaps() const noexcept override { return gaps_.load(std::memory_order_relaxed); }
+  std::uint64_t late_callbacks() const noexcept override { return late_.load(std::memory_order_relaxed); }
   std::string failure_reason() const override {
     if (!stream_failed.load(std::memory_order_relaxed)) return {};
     return "the sound server went away; start it again, or use --output none with --wav FILE";
@@ -97,11 +126,15 @@ class PulseOutput final : public AudioOutput {
     // one.
     const auto now = std::chrono::steady_clock::now();
     if (called_ && now - last_call_ > latency()) gaps_.fetch_add(1, std::memory_order_relaxed);
+    if (called_ && now - last_call_ > 2 * latency() / params_.buffers) late_.fetch_add(1, std::memory_order_relaxed);
     called_ = true;
     last_call_ = now;
-    const std::span<float> mono(mono_.data(), std::min(frames, kMaxFrames));
-    source_.render(mono);
-    for (std::size_t i = 0; i < mono.size(); ++i) out[kChannels * i] = out[kChannels * i + 1] = mono[i];
+    const std::size_t count = std::min(frames, kMaxFrames);
+    source_.render(std::span(left_).first(count), std::span(right_).first(count));
+    for (std::size_t i = 0; i < count; ++i) {
+      out[kChannels * i] = left_[i];
+      out[kChannels * i + 1] = right_[i];
+    }
   }
 
   void close() noexcept {
@@ -116,13 +149,25 @@ class PulseOutput final : public AudioOutput {
   OutputParams params_;
   SoundSource& source_;
   std::unique_ptr<RtAudio> audio_;
-  std::array<float, kMaxFrames> mono_{};
-  std::atomic<std::uint64_t> gaps_{0};
+  std::array<float, kMaxFrames> left_{}, right_{};
+  std::atomic<std::uint64_t> gaps_{0}, late_{0};
   std::chrono::steady_clock::time_point last_call_;
   bool called_ = false;
 };
 
 }  // namespace
+
+Result<std::vector<OutputDevice>> output_devices() {
+  try {
+    const Result<std::unique_ptr<RtAudio>> audio = pulse();
+    if (!audio) return tl::unexpected(audio.error());
+    Result<PulseDevices> devices = devices_of(**audio);
+    if (!devices) return tl::unexpected(devices.error());
+    return std::move(devices->sinks);
+  } catch (const RtAudioError& error) {
+    return no_server(error.getMessage());
+  }
+}
 
 Result<std::unique_ptr<AudioOutput>> open_pulse_output(const OutputParams& params, SoundSource& source) {
   auto output = std::make_unique<PulseOutput>(params, source);

@@ -5,7 +5,10 @@
 namespace osteon::audio {
 
 Result<void> ReconnectingOutput::fail(Error error) {
-  if (output_) earlier_gaps_ += output_->gaps();
+  if (output_) {
+    earlier_gaps_ += output_->gaps();
+    earlier_late_ += output_->late_callbacks();
+  }
   output_.reset();
   trouble_ = error.message;
   return tl::unexpected(std::move(error));
@@ -46,5 +49,9 @@ std::chrono::nanoseconds ReconnectingOutput::latency() const {
 }
 
 std::uint64_t ReconnectingOutput::gaps() const { return earlier_gaps_ + (output_ ? output_->gaps() : 0); }
+
+std::uint64_t ReconnectingOutput::late_callbacks() const {
+  return earlier_late_ + (output_ ? output_->late_callbacks() : 0);
+}
 
 }  // namespace osteon::audio

@@ -32,6 +32,7 @@ class ReconnectingOutput {
   [[nodiscard]] const std::string& trouble() const { return trouble_; }
   [[nodiscard]] std::chrono::nanoseconds latency() const;  // 0 without an output
   [[nodiscard]] std::uint64_t gaps() const;                // of all outputs
+  [[nodiscard]] std::uint64_t late_callbacks() const;      // of all outputs
 
  private:
   [[nodiscard]] Result<void> fail(Error error);
@@ -40,7 +41,7 @@ class ReconnectingOutput {
   std::unique_ptr<AudioOutput> output_;
   std::string trouble_ = "the sound has not begun yet";
   Clock::time_point tried_{};
-  std::uint64_t earlier_gaps_ = 0;  // of outputs that are gone
+  std::uint64_t earlier_gaps_ = 0, earlier_late_ = 0;  // of outputs that are gone
 };
 
 }  // namespace osteon::audio

@@ -9,14 +9,17 @@
 #include <string>
 #include <thread>
 
+#include "common/core/check.hpp"
 #include "common/runtime/spsc_queue.hpp"
 
 namespace osteon::audio {
 namespace {
 
+constexpr std::size_t kPieceFrames = 256;
+
 struct Piece {
-  std::array<float, 256> samples;
-  std::uint32_t count;
+  std::array<float, 2 * kPieceFrames> samples;  // of all channels, frame after frame
+  std::uint32_t frames;
 };
 
 }  // namespace
@@ -24,6 +27,7 @@ struct Piece {
 struct WavRecorder::Impl {
   std::filesystem::path path;
   SNDFILE* file = nullptr;
+  int channels = 2;
   SpscQueue<Piece, 1024> queue;
   std::atomic<std::uint64_t> written{0}, lost{0};
   std::atomic<bool> write_failed{false};
@@ -32,9 +36,9 @@ struct WavRecorder::Impl {
   void drain() {
     Piece piece;
     while (queue.try_pop(piece)) {
-      const sf_count_t count = piece.count;
-      if (sf_writef_float(file, piece.samples.data(), count) != count) write_failed = true;
-      written.fetch_add(piece.count, std::memory_order_relaxed);
+      const sf_count_t frames = piece.frames;
+      if (sf_writef_float(file, piece.samples.data(), frames) != frames) write_failed = true;
+      written.fetch_add(piece.frames, std::memory_order_relaxed);
     }
   }
 
@@ -62,12 +66,13 @@ WavRecorder::~WavRecorder() {
     const Result<void> closed = close();
 }
 
-Result<WavRecorder> WavRecorder::open(const std::filesystem::path& file, unsigned rate_hz) {
+Result<WavRecorder> WavRecorder::open(const std::filesystem::path& file, unsigned rate_hz, int channels) {
+  OSTEON_CHECK(channels == 1 || channels == 2);
   auto impl = std::make_unique<Impl>();
   impl->path = file;
   SF_INFO info{};
   info.samplerate = static_cast<int>(rate_hz);
-  info.channels = 1;
+  info.channels = impl->channels = channels;
   info.format = SF_FORMAT_WAV | SF_FORMAT_PCM_16;
   impl->file = sf_open(file.c_str(), SFM_WRITE, &info);
   if (!impl->file) {
@@ -78,13 +83,22 @@ Result<WavRecorder> WavRecorder::open(const std::filesystem::path& file, unsigne
   return WavRecorder(std::move(impl));
 }
 
-void WavRecorder::push(std::span<const float> mono) noexcept {
-  while (!mono.empty()) {
+void WavRecorder::push(std::span<const float> left, std::span<const float> right) noexcept {
+  for (std::size_t done = 0; done < left.size();) {
     Piece piece;
-    piece.count = static_cast<std::uint32_t>(std::min(mono.size(), piece.samples.size()));
-    std::copy_n(mono.begin(), piece.count, piece.samples.begin());
-    if (!impl_->queue.try_push(piece)) impl_->lost.fetch_add(piece.count, std::memory_order_relaxed);
-    mono = mono.subspan(piece.count);
+    const std::size_t frames = std::min(left.size() - done, kPieceFrames);
+    piece.frames = static_cast<std::uint32_t>(frames);
+    for (std::size_t i = 0; i < frames; ++i) {
+      const float l = left[done + i], r = right[done + i];
+      if (impl_->channels == 1) {
+        piece.samples[i] = 0.5F * (l + r);
+      } else {
+        piece.samples[2 * i] = l;
+        piece.samples[2 * i + 1] = r;
+      }
+    }
+    if (!impl_->queue.try_push(piece)) impl_->lost.fetch_add(frames, std::memory_order_relaxed);
+    done += frames;
   }
 }
 

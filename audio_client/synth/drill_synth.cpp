@@ -17,17 +17,31 @@ void DrillSynth::prepare(const SynthParams& params) {
 
 void DrillSynth::reset() noexcept {
   voices_.fill(Voice{});
+  for (SoundPath& path : paths_) path.prepare(params_.space, params_.rate_hz);
+  suction_path_.prepare(params_.space, params_.rate_hz);
   suction_.prepare(params_.suction, params_.rate_hz, params_.seed);
   limiter_.reset();
-  block_.fill(0.0F);
+  block_ = StereoBlock{};
   used_ = kBlockFrames;
   tail_blocks_ = 0;
 }
 
+void DrillSynth::listen(const Space& space) noexcept {
+  params_.space = space;
+  reset();
+}
+
+void DrillSynth::aim_suction(std::span<const ToolSound> tools) noexcept {
+  const auto first = std::ranges::find_if(tools, &ToolSound::suction);
+  const bool on = first != tools.end();
+  if (on && !suction_.sounding() && !suction_path_.ringing()) suction_path_.start(first->tip_mm);
+  if (on) suction_path_.aim(first->tip_mm);
+  suction_.aim(on);
+}
+
 void DrillSynth::aim(const SoundScene& scene) noexcept {
   std::array<bool, kVoices> aimed{};
-  const auto tools = std::span(scene.tools).first(static_cast<std::size_t>(scene.count));
-  suction_.aim(std::ranges::any_of(tools, &ToolSound::suction));
+  aim_suction(std::span(scene.tools).first(static_cast<std::size_t>(scene.count)));
   for (int t = 0; t < scene.count; ++t) {
     const ToolSound& tool = scene.tools[static_cast<std::size_t>(t)];
     const auto same = std::find_if(voices_.begin(), voices_.end(), [&](const Voice& v) {
@@ -35,40 +49,60 @@ void DrillSynth::aim(const SoundScene& scene) noexcept {
     });
     if (same != voices_.end()) {
       same->aim(tool);
-      aimed[static_cast<std::size_t>(same - voices_.begin())] = true;
+      const auto at = static_cast<std::size_t>(same - voices_.begin());
+      paths_[at].aim(tool.tip_mm);
+      aimed[at] = true;
       continue;
     }
     if (tool.rpm == 0) continue;  // at rest: no sound
-    const auto free = std::find_if(voices_.begin(), voices_.end(), [](const Voice& v) { return !v.sounding(); });
-    if (free == voices_.end()) continue;
-    free->start(handpieces_[static_cast<std::size_t>(tool.handpiece)], params_.voice, params_.rate_hz, tool,
-                params_.seed + tool.author);
-    aimed[static_cast<std::size_t>(free - voices_.begin())] = true;
+    std::size_t free = 0;
+    while (free < voices_.size() && !vacant(free)) ++free;
+    if (free == voices_.size()) continue;
+    paths_[free].start(tool.tip_mm);
+    voices_[free].start(handpieces_[static_cast<std::size_t>(tool.handpiece)], params_.voice, params_.rate_hz, tool,
+                        params_.seed + tool.author);
+    aimed[free] = true;
   }
   for (std::size_t v = 0; v < voices_.size(); ++v) {
     if (voices_[v].sounding() && !aimed[v]) voices_[v].release();
   }
 }
 
-void DrillSynth::process(std::span<float> frames) noexcept {
-  while (!frames.empty()) {
+void DrillSynth::process(std::span<float> left, std::span<float> right) noexcept {
+  OSTEON_CHECK(left.size() == right.size());
+  for (std::size_t done = 0; done < left.size();) {
     if (used_ == kBlockFrames) render_block();
-    const std::size_t count = std::min(frames.size(), static_cast<std::size_t>(kBlockFrames - used_));
-    std::copy_n(block_.begin() + used_, count, frames.begin());
+    const std::size_t count = std::min(left.size() - done, static_cast<std::size_t>(kBlockFrames - used_));
+    std::copy_n(block_.left.begin() + used_, count, left.subspan(done).begin());
+    std::copy_n(block_.right.begin() + used_, count, right.subspan(done).begin());
     used_ += static_cast<int>(count);
-    frames = frames.subspan(count);
+    done += count;
+  }
+}
+
+void DrillSynth::process(std::span<float> mono) noexcept {
+  Block other;
+  while (!mono.empty()) {
+    const std::span<float> part = mono.first(std::min(mono.size(), other.size()));
+    process(part, std::span(other).first(part.size()));
+    for (std::size_t i = 0; i < part.size(); ++i) part[i] = 0.5F * (part[i] + other[i]);
+    mono = mono.subspan(part.size());
   }
 }
 
 void DrillSynth::render_block() noexcept {
-  block_.fill(0.0F);
-  for (Voice& voice : voices_) {
-    if (!voice.sounding()) continue;
-    voice.add_to(block_);
+  block_ = StereoBlock{};
+  for (std::size_t v = 0; v < voices_.size(); ++v) {
+    if (vacant(v)) continue;
+    Block own{};
+    if (voices_[v].sounding()) voices_[v].add_to(own);
+    paths_[v].add_to(own, block_);
     tail_blocks_ = 2;
   }
-  if (suction_.sounding()) {
-    suction_.add_to(block_);
+  if (suction_.sounding() || suction_path_.ringing()) {
+    Block own{};
+    if (suction_.sounding()) suction_.add_to(own);
+    suction_path_.add_to(own, block_);
     tail_blocks_ = 2;
   }
   limiter_.process(block_);
@@ -77,8 +111,10 @@ void DrillSynth::render_block() noexcept {
 }
 
 bool DrillSynth::silent() const noexcept {
-  return tail_blocks_ == 0 && !suction_.sounding() &&
-         std::none_of(voices_.begin(), voices_.end(), [](const Voice& v) { return v.sounding(); });
+  if (tail_blocks_ != 0 || suction_.sounding() || suction_path_.ringing()) return false;
+  for (std::size_t v = 0; v < voices_.size(); ++v)
+    if (!vacant(v)) return false;
+  return true;
 }
 
 }  // namespace osteon::audio

@@ -1,9 +1,11 @@
-// The sound of all tools in the room as one mono signal: a pure function of its scenes and its seed.
+// The sound of all tools in the room, for both ears: a pure function of its scenes and its seed.
 #pragma once
 #include <array>
 #include <cstdint>
 #include <span>
 
+#include "audio_client/space/block.hpp"
+#include "audio_client/space/sound_path.hpp"
 #include "audio_client/synth/handpiece.hpp"
 #include "audio_client/synth/limiter.hpp"
 #include "audio_client/synth/sound_scene.hpp"
@@ -17,21 +19,27 @@ struct SynthParams {
   std::uint64_t seed = 1;
   VoiceParams voice;
   SuctionParams suction;
+  Space space;
 };
 
 class DrillSynth {
  public:
-  // A change of scene becomes audible this many frames later, because the limiter looks ahead.
+  // A change of scene becomes audible this many frames later, because the limiter looks ahead. Then it is still under
+  // way to the listener, except in mono.
   static constexpr int kLatency_frames = kBlockFrames;
 
-  void prepare(const SynthParams& params);  // may allocate; silences
-  void reset() noexcept;                    // [audio] silent at once, as after prepare
+  void prepare(const SynthParams& params);   // may allocate; silences
+  void reset() noexcept;                     // [audio] silent at once, as after prepare
+  void listen(const Space& space) noexcept;  // from another place from now on; silent at once
 
   // [audio] Takes effect with the next block. A tool that is not in the scene runs down and falls silent.
   void aim(const SoundScene& scene) noexcept;
-  // [audio] Fills `frames` with samples in -1 to 1; exactly zero when no tool sounds.
-  void process(std::span<float> frames) noexcept;
+  // [audio] Fills both channels, of equal sizes, with samples in -1 to 1; exactly zero when no tool sounds.
+  void process(std::span<float> left, std::span<float> right) noexcept;
+  // [audio] The mean of both channels. In mono they are equal.
+  void process(std::span<float> mono) noexcept;
 
+  [[nodiscard]] const Space& space() const noexcept { return params_.space; }
   [[nodiscard]] bool silent() const noexcept;  // no tool sounds, and none will before a new scene
 
  private:
@@ -39,13 +47,20 @@ class DrillSynth {
   static constexpr int kVoices = 2 * kMaxTools;
 
   void render_block() noexcept;
+  void aim_suction(std::span<const ToolSound> tools) noexcept;
+  // Where a source of its own may start: nothing sounds here, and nothing is under way.
+  [[nodiscard]] bool vacant(std::size_t voice) const noexcept {
+    return !voices_[voice].sounding() && !paths_[voice].ringing();
+  }
 
   SynthParams params_;
   std::array<Handpiece, kHandpieceKinds> handpieces_;
   std::array<Voice, kVoices> voices_;
-  SuctionSound suction_;  // one for all suckers of the room
+  std::array<SoundPath, kVoices> paths_;  // of each voice to the listener
+  SuctionSound suction_;                  // one for all suckers of the room, heard from the first of them
+  SoundPath suction_path_;
   Limiter limiter_;
-  Block block_{};
+  StereoBlock block_;
   int used_ = kBlockFrames;  // frames of the block that were already returned
   int tail_blocks_ = 0;      // blocks until the limiter has returned the last sounding block
 };

@@ -5,9 +5,10 @@
 
 namespace osteon::audio {
 
-void Limiter::process(Block& block) noexcept {
+void Limiter::process(StereoBlock& block) noexcept {
   float peak = 0;
-  for (const float x : block) peak = std::max(peak, std::abs(x));
+  for (const Block* channel : {&block.left, &block.right})
+    for (const float x : *channel) peak = std::max(peak, std::abs(x));
   const float allowed = peak > kCeiling ? kCeiling / peak : 1.0F;
 
   std::swap(waiting_, block);
@@ -15,8 +16,10 @@ void Limiter::process(Block& block) noexcept {
   waiting_gain_ = allowed;
   if (gain_ < 1.0F || end < 1.0F) {
     const float step = (end - gain_) / kBlockFrames;
-    float gain = gain_;
-    for (float& x : block) x *= (gain += step);
+    for (Block* channel : {&block.left, &block.right}) {
+      float gain = gain_;
+      for (float& x : *channel) x *= (gain += step);
+    }
   }
   gain_ = end;
 }

@@ -33,6 +33,7 @@ std::string encode(const SoundReport& report) {
               {"buffer_ms", report.buffer_ms},
               {"latency_ms", report.latency_ms},
               {"gaps", report.gaps},
+              {"late_callbacks", report.late_callbacks},
               {"device", shortened(report.device)},
               {"trouble", shortened(report.trouble)}}
       .dump(-1, ' ', false, json::error_handler_t::replace);
@@ -59,6 +60,7 @@ Result<SoundReport> read_sound_report(std::string_view text) {
   report.buffer_ms = fields->number("buffer_ms", 0.0, kMost_ms);
   report.latency_ms = fields->number("latency_ms", 0.0, kMost_ms);
   report.gaps = fields->number("gaps", 0.0, kMostGaps);
+  report.late_callbacks = fields->number("late_callbacks", 0.0, kMostGaps);
   report.device = fields->text("device");
   report.trouble = fields->text("trouble");
   if (const Result<void> read = fields->outcome(); !read) return tl::unexpected(read.error());

@@ -23,15 +23,16 @@ struct SoundSettings {
 
 // From the audio client.
 struct SoundReport {
-  std::vector<int> wave{};   // what was played last, oldest first; kFullScale is the amplitude 1
-  double rate_hz = 48000.0;  // of the samples
-  double level = 0;          // largest amplitude since the report before, 0 to 1
-  double work_ms = 0;        // longest computation of a buffer since the report before
-  double buffer_ms = 0;      // duration of a buffer; a longer computation makes a gap
-  double latency_ms = 0;     // from a state of the tool to its sound, upper bound
-  double gaps = 0;           // since the start
-  std::string device{};      // that plays it, such as PulseAudio; empty: none
-  std::string trouble{};     // one sentence, such as why there is no device; empty: none
+  std::vector<int> wave{};    // what was played last, oldest first; kFullScale is the amplitude 1
+  double rate_hz = 48000.0;   // of the samples
+  double level = 0;           // largest amplitude since the report before, 0 to 1
+  double work_ms = 0;         // longest computation of a buffer since the report before
+  double buffer_ms = 0;       // duration of a buffer; a longer computation makes a gap
+  double latency_ms = 0;      // from a state of the tool to its sound, upper bound
+  double gaps = 0;            // since the start
+  double late_callbacks = 0;  // since the start: calls that came more than a buffer late, heard or not
+  std::string device{};       // that plays it, such as PulseAudio; empty: none
+  std::string trouble{};      // one sentence, such as why there is no device; empty: none
   friend bool operator==(const SoundReport&, const SoundReport&) = default;
 };
 

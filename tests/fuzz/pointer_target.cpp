@@ -109,6 +109,7 @@ Target sound_message_target() {
   report.level = 0.5;
   report.work_ms = 0.125;
   report.buffer_ms = 5.333;
+  report.late_callbacks = 7;
   report.device = "PulseAudio";
   report.trouble = "no sound server answers (\u00fc)";
   Target target{

@@ -101,9 +101,11 @@ class DrillingRoom : public testing::Test {
     SF_INFO info{};
     SNDFILE* wav = sf_open((stage / "sound.wav").c_str(), SFM_READ, &info);
     ASSERT_NE(wav, nullptr);
-    r.sound.resize(static_cast<std::size_t>(info.frames * info.channels));
-    sf_readf_float(wav, r.sound.data(), info.frames);
+    ASSERT_EQ(info.channels, 2);
+    std::vector<float> both(static_cast<std::size_t>(2 * info.frames));
+    sf_readf_float(wav, both.data(), info.frames);
     sf_close(wav);
+    for (std::size_t i = 0; i + 1 < both.size(); i += 2) r.sound.push_back(0.5F * (both[i] + both[i + 1]));
   }
   static void TearDownTestSuite() { results_.reset(); }
 

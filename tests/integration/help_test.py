@@ -73,6 +73,8 @@ class Help(unittest.TestCase):
         self.assertIn("--case-hash", completed("osteon-server", "rooms", "create", "--ca"))
         self.assertIn("plan", completed("osteon-haptic", "pl"))
         self.assertIn("analyse", completed("osteon-audio", "an"))
+        self.assertIn("devices", completed("osteon-audio", "de"))
+        self.assertIn("--hrtf", completed("osteon-audio", "--hr"))
         self.assertIn("--displacement", completed("osteon-audio", "analyse", "--di"))
         self.assertIn("--refine", completed("osteon-audio", "model", "--re"))
         self.assertIn("resynthesise", completed("osteon-audio", "re"))

@@ -104,6 +104,7 @@ SoundDialog::SoundDialog(const Chosen& chosen, std::function<void(const Chosen&)
   work_ = row(tr("Computing time of a buffer"), "sound_work");
   latency_ = row(tr("Latency from tool to ear, at most"), "sound_latency");
   gaps_ = row(tr("Gaps"), "sound_gaps");
+  late_ = row(tr("Late callbacks"), "sound_late");
   device_ = row(tr("Device"), "sound_device");
   trouble_ = new QLabel;
   trouble_->setObjectName("sound_trouble");
@@ -147,6 +148,7 @@ void SoundDialog::show_report(const std::optional<SoundReport>& report, const QS
   text(work_, [&] { return tr("%1 of %2 ms").arg(decimals(report->work_ms, 2), decimals(report->buffer_ms, 2)); });
   text(latency_, [&] { return tr("%1 ms").arg(decimals(report->latency_ms, 1)); });
   text(gaps_, [&] { return QLocale().toString(static_cast<qlonglong>(report->gaps)); });
+  text(late_, [&] { return QLocale().toString(static_cast<qlonglong>(report->late_callbacks)); });
   text(device_, [&] { return QString::fromStdString(report->device); });
   QString trouble = missing;
   if (report) trouble = played ? QString() : tr("No sound device: %1").arg(sound_trouble(report->trouble));

@@ -58,7 +58,7 @@ class SoundDialog : public QDialog {
   std::function<void(const Chosen&)> changed_;
   QCheckBox* on_;
   QSlider* volume_;
-  QLabel *percent_, *level_, *work_, *latency_, *gaps_, *device_, *trouble_;
+  QLabel *percent_, *level_, *work_, *latency_, *gaps_, *late_, *device_, *trouble_;
   WavePlot* plot_;
   bool showing_ = false;  // a change is not the user's
 };

@@ -104,6 +104,9 @@ FIGURES = [
     Figure("cut_to_sound_p99", "ms", "from a cutting state until it is in the sound, 99th percentile", "rig"),
     Figure("sound_analysis_speed", "times_real_time", "length of a recording of 30 s at 48 kHz over the time of its "
            "analysis, without files", "sound_analysis", (">=", 20.0)),
+    *[Figure(f"sound_binaural_{name}_speed", "times_real_time", f"length of a scripted drilling over the processor's "
+             f"time of its synthesis for headphones, with a tool that {what}", "sound_binaural", (">=", 100.0))
+      for name, what in (("still", "stays at one place"), ("moving", "turns, and its filters in each block"))],
     Figure("sound_model_speed", "times_real_time", "length of the same recording over the processor's time of its "
            "spectral model, without refinement", "sound_model", (">=", 20.0)),
     Figure("sound_model_refined_speed", "times_real_time", "the same with two rounds of refinement", "sound_model",

@@ -65,4 +65,15 @@ def models(run):
     return values
 
 
-GROUPS = {"sound_analysis": analysis, "sound_model": models}
+def binaural(run):
+    run.say("synthesis for headphones")
+    speeds = {"still": [], "moving": []}
+    for _ in range(5):
+        text = run.output("osteon-sound-bench")
+        for name, values in speeds.items():
+            values.append(float(re.search(rf"^{name} ([\d.]+) times as fast", text, re.M)[1]))
+    return {f"sound_binaural_{name}_speed": Measured(float(np.median(values)), None, min(values), max(values), 1)
+            for name, values in speeds.items()}
+
+
+GROUPS = {"sound_analysis": analysis, "sound_binaural": binaural, "sound_model": models}

@@ -7,16 +7,20 @@
 #include <chrono>
 #include <cmath>
 #include <cstdio>
+#include <cstdlib>
 #include <mutex>
 #include <numbers>
 #include <span>
+#include <string>
 #include <thread>
 #include <vector>
 
 #include "audio_client/output/audio_output.hpp"
+#include "audio_client/output/reconnecting_output.hpp"
 #include "audio_client/output/sound_engine.hpp"
 #include "common/sound/levels.hpp"
 #include "common/sound/tones.hpp"
+#include "tests/support/process.hpp"
 #include "tests/support/wait.hpp"
 #include "tests/unit/audio_client/scripted_drilling.hpp"
 
@@ -26,7 +30,7 @@ namespace {
 using namespace std::chrono_literals;
 using Clock = std::chrono::steady_clock;
 
-// Records the left channel of the sink's monitor, and when each block arrived.
+// Records both channels of the sink's monitor, and when each block arrived.
 class Monitor {
  public:
   Monitor() {
@@ -46,6 +50,10 @@ class Monitor {
   [[nodiscard]] std::vector<float> left() {
     const std::lock_guard lock(mutex_);
     return left_;
+  }
+  [[nodiscard]] std::vector<float> right() {
+    const std::lock_guard lock(mutex_);
+    return right_;
   }
   [[nodiscard]] Clock::time_point arrival(std::size_t sample) {
     const std::lock_guard lock(mutex_);
@@ -70,9 +78,10 @@ class Monitor {
       const std::lock_guard lock(mutex_);
       std::size_t at = 0;
       for (; at + 8 <= bytes.size(); at += 8) {
-        float sample;
-        std::copy_n(bytes.data() + at, sizeof sample, reinterpret_cast<char*>(&sample));
-        left_.push_back(sample);
+        float samples[2];
+        std::copy_n(bytes.data() + at, sizeof samples, reinterpret_cast<char*>(samples));
+        left_.push_back(samples[0]);
+        right_.push_back(samples[1]);
       }
       bytes.erase(bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(at));
       pieces_.emplace_back(left_.size(), now);
@@ -81,7 +90,7 @@ class Monitor {
 
   FILE* pipe_;
   std::mutex mutex_;
-  std::vector<float> left_;
+  std::vector<float> left_, right_;
   std::vector<std::pair<std::size_t, Clock::time_point>> pieces_;
   std::jthread thread_;
 };
@@ -104,14 +113,16 @@ struct ToneSource final : SoundSource {
   std::atomic<std::int64_t> started_ns{0};
   std::atomic<std::uint64_t> frames{0};
   std::uint64_t at = 0;
-  void render(std::span<float> mono) noexcept override {
+  void render(std::span<float> left, std::span<float> right) noexcept override {
     const bool sounds = on.load();
     if (sounds && at == 0) started_ns = Clock::now().time_since_epoch().count();
-    for (float& x : mono) {
-      x = sounds ? static_cast<float>(0.5 * std::cos(2 * std::numbers::pi * 1000 * static_cast<double>(at++) / 48000))
-                 : 0.0F;
+    for (std::size_t i = 0; i < left.size(); ++i, ++at) {
+      const double turn = 2 * std::numbers::pi * static_cast<double>(at) / 48000;
+      left[i] = sounds ? static_cast<float>(0.5 * std::cos(1000 * turn)) : 0.0F;
+      right[i] = sounds ? static_cast<float>(0.25 * std::cos(1500 * turn)) : 0.0F;
     }
-    frames += mono.size();
+    if (!sounds) at = 0;
+    frames += left.size();
   }
 };
 
@@ -137,6 +148,10 @@ TEST(PulseOutput, RenderedToneArrivesAtTheSink) {
   const sound::Tone heard = sound::find_tone(tone, 48000, 900, 1100);
   EXPECT_NEAR(heard.hz, 1000, 1);
   EXPECT_NEAR(heard.level_db, 20 * std::log10(0.5), 1.0);
+  const std::vector<float> right = monitor.right();
+  const std::span<const float> other = std::span(right).subspan(first + 1000, 20000);
+  EXPECT_NEAR(sound::find_tone(other, 48000, 1400, 1600).level_db, 20 * std::log10(0.25), 1.0);
+  EXPECT_LT(sound::tone_db(other, 48000, 1000), -60) << "the channels are apart";
 
   const double took_ms = std::chrono::duration<double, std::milli>(monitor.arrival(first).time_since_epoch()).count() -
                          static_cast<double>(source.started_ns) / 1e6;
@@ -144,6 +159,25 @@ TEST(PulseOutput, RenderedToneArrivesAtTheSink) {
   std::printf("render to monitor %.1f ms, stated bound %.1f ms, %llu gaps\n", took_ms, stated_ms,
               static_cast<unsigned long long>((*output)->gaps()));
   EXPECT_GT(took_ms, 0);
+}
+
+TEST(PulseOutput, TheSinkIsListedAndChosenByItsName) {
+  const auto devices = output_devices();
+  ASSERT_TRUE(devices) << devices.error().message;
+  ASSERT_EQ(devices->size(), 1U) << "the monitor is a source";
+  EXPECT_TRUE(devices->front().is_default);
+  EXPECT_EQ(devices->front().channels, 2U);
+  EXPECT_EQ(devices->front().rate_hz, 48000U);
+  EXPECT_FALSE(devices->front().name.empty());
+  ToneSource source;
+  const auto output = open_output({.kind = OutputKind::pulse, .device = devices->front().name}, source);
+  ASSERT_TRUE(output) << output.error().message;
+  ASSERT_TRUE((*output)->start());
+  EXPECT_TRUE(test::wait_until([&] { return source.frames > 4800; }, 30s));
+  (*output)->stop();
+  const auto none = open_output({.kind = OutputKind::pulse, .device = "Concert hall"}, source);
+  ASSERT_FALSE(none);
+  EXPECT_EQ(none.error().code, ErrorCode::invalid_input);
 }
 
 TEST(PulseOutput, DrillIsHeardThroughTheServer) {
@@ -178,6 +212,47 @@ TEST(PulseOutput, DrillIsHeardThroughTheServer) {
   const sound::Tone mesh = sound::find_tone(std::span(left).last(kAcknowledged), 48000, mesh_hz - 20, mesh_hz + 20);
   EXPECT_NEAR(mesh.hz, mesh_hz, 1);
   EXPECT_GT(mesh.level_db, -45);
+}
+
+// The last one: it ends the server of deploy/with-null-sink, and starts another one in the same place.
+TEST(RestartedServer, IsPlayedToAgain) {
+  const char* folder = std::getenv("XDG_RUNTIME_DIR");
+  ASSERT_NE(folder, nullptr);
+  ToneSource source;
+  ReconnectingOutput output([&] { return open_output({.kind = OutputKind::pulse}, source); });
+  ASSERT_TRUE(output.open()) << output.trouble();
+  ASSERT_TRUE(output.start());
+  ASSERT_TRUE(test::wait_until([&] { return source.frames > 4800; }, 30s));
+
+  EXPECT_EQ(test::run("pactl", {"exit"}).exit_code, 0);
+  ASSERT_TRUE(test::wait_until(
+      [&] {
+        output.maintain(Clock::now(), false);
+        return !output.trouble().empty();
+      },
+      30s));
+  EXPECT_EQ(output.trouble(), "the sound server went away; start it again, or use --output none with --wav FILE");
+
+  test::ProcessOptions home;
+  home.environment = {{"HOME", folder}};
+  const test::Process server(
+      "pulseaudio",
+      {"-n", "-F", std::string(folder) + "/null.pa", "--daemonize=no", "--exit-idle-time=-1", "--use-pid-file=no"},
+      home);
+  ASSERT_TRUE(test::wait_until(
+      [&] {
+        output.maintain(Clock::now(), true);
+        return output.trouble().empty();
+      },
+      60s))
+      << output.trouble();
+  const std::uint64_t before = source.frames;
+  source.on = true;
+  Monitor monitor;
+  ASSERT_TRUE(test::wait_until([&] { return source.frames > before + 96000 && monitor.size() > 48000; }, 60s));
+  output.stop();
+  const std::vector<float> left = monitor.left();
+  EXPECT_NEAR(sound::find_tone(std::span(left).last(24000), 48000, 900, 1100).level_db, 20 * std::log10(0.5), 1.0);
 }
 
 }  // namespace

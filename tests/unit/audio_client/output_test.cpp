@@ -32,22 +32,23 @@ SoundScene scene_of(const CuttingState& state, std::int64_t received_ns) {
 
 struct CountingSource final : SoundSource {
   std::atomic<std::uint64_t> frames{0};
-  void render(std::span<float> mono) noexcept override {
-    std::fill(mono.begin(), mono.end(), 0.0F);
-    frames += mono.size();
+  void render(std::span<float> left, std::span<float> right) noexcept override {
+    std::fill(left.begin(), left.end(), 0.0F);
+    std::fill(right.begin(), right.end(), 0.0F);
+    frames += left.size();
   }
 };
 
 TEST(SoundEngine, NotesEachStateOnceWhenItIsFirstRendered) {
   SoundEngine engine(SynthParams{});
-  std::vector<float> frames(256);
+  std::vector<float> frames(256), right(256);
   CuttingState state = test::cortical_drill(1345);
   const std::int64_t before = std::chrono::steady_clock::now().time_since_epoch().count();
   for (const std::uint64_t seq : {1U, 2U, 2U, 5U}) {
     state.state_seq = seq;
     engine.deliver(scene_of(state, before));
-    engine.render(frames);
-    engine.render(frames);
+    engine.render(frames, right);
+    engine.render(frames, right);
   }
   std::vector<std::uint64_t> seen;
   Sounded sounded;
@@ -91,9 +92,9 @@ TEST(SoundEngine, ALoadThatRisesGoesOnForAPeriod) {
 
 TEST(SoundEngine, StatedLatencyIsWhereASceneIsFirstHeard) {
   SoundEngine engine(SynthParams{});
-  std::vector<float> frames(1024);
+  std::vector<float> frames(1024), right(1024);
   engine.deliver(scene_of(test::free_drill(1400), 1));
-  engine.render(frames);
+  engine.render(frames, right);
   const auto first = std::find_if(frames.begin(), frames.end(), [](float x) { return x != 0; }) - frames.begin();
   const double stated = std::chrono::duration<double>(engine.latency()).count() * 48000;
   EXPECT_GE(first, stated - 0.01);
@@ -102,11 +103,11 @@ TEST(SoundEngine, StatedLatencyIsWhereASceneIsFirstHeard) {
 
 TEST(SoundEngine, RenderDoesNotAllocateEvenWhileRecording) {
   const test::TempDir temp;
-  auto recorder = WavRecorder::open(temp / "a.wav", 48000);
+  auto recorder = WavRecorder::open(temp / "a.wav", 48000, 2);
   ASSERT_TRUE(recorder);
   SoundEngine engine(SynthParams{});
   engine.record_to(*recorder);
-  std::vector<float> frames(256);
+  std::vector<float> frames(256), right(256);
   std::vector<SoundScene> scenes;
   const test::ScriptedDrilling script = test::scripted_drilling();
   for (const CuttingState& state : script.states) scenes.push_back(scene_of(state, 1));
@@ -115,7 +116,7 @@ TEST(SoundEngine, RenderDoesNotAllocateEvenWhileRecording) {
   for (const SoundScene& scene : scenes) {
     engine.deliver(scene);
     engine.set_volume(volume = 1.0 - volume);
-    engine.render(frames);
+    engine.render(frames, right);
     static_cast<void>(engine.wave());
     static_cast<void>(engine.take_level());
     static_cast<void>(engine.take_longest_work());
@@ -130,14 +131,15 @@ TEST(VolumeRamp, AConstantFollowsAStraightLineFromOneVolumeToTheNext) {
     VolumeRamp ramp(rate_hz);
     double factor = 1.0;
     for (const double wanted : {1.0, 0.0, 1.0, 0.25, 0.75, 0.75}) {
-      std::vector<float> mono(4096, 1.0F);
+      std::vector<float> mono(4096, 1.0F), other(4096, -2.0F);
       // In two buffers: a ramp goes on where the one before ended.
-      ramp.apply(std::span(mono).first(100), wanted);
-      ramp.apply(std::span(mono).subspan(100), wanted);
+      ramp.apply(std::span(mono).first(100), std::span(other).first(100), wanted);
+      ramp.apply(std::span(mono).subspan(100), std::span(other).subspan(100), wanted);
       const double whole = 0.03 * rate_hz;
       for (std::size_t i = 0; i < mono.size(); ++i) {
         const double way = std::min(static_cast<double>(i + 1) / whole, std::abs(wanted - factor));
         ASSERT_NEAR(mono[i], factor + std::copysign(way, wanted - factor), 1e-6) << wanted << " " << i;
+        ASSERT_EQ(other[i], -2.0F * mono[i]) << "both channels have one factor";
       }
       factor = wanted;
     }
@@ -153,8 +155,11 @@ TEST(VolumeRamp, ASineHasNoStepBeyondItsOwnAndTheRamps) {
   for (std::size_t i = 0; i < mono.size(); ++i)
     mono[i] = static_cast<float>(kAmplitude * std::sin(2.0 * kPi * kSine_hz * static_cast<double>(i) / kRate_hz));
   const double volumes[] = {0.0, 1.0, 0.3, 1.0, 0.0, 0.6};
-  for (std::size_t at = 0, turn = 0; at < mono.size(); at += 256, ++turn)
-    ramp.apply(std::span(mono).subspan(at, std::min<std::size_t>(256, mono.size() - at)), volumes[turn % 6]);
+  std::vector<float> other = mono;
+  for (std::size_t at = 0, turn = 0; at < mono.size(); at += 256, ++turn) {
+    const std::size_t count = std::min<std::size_t>(256, mono.size() - at);
+    ramp.apply(std::span(mono).subspan(at, count), std::span(other).subspan(at, count), volumes[turn % 6]);
+  }
   double largest = 0.0;
   for (std::size_t i = 1; i < mono.size(); ++i)
     largest = std::max(largest, static_cast<double>(std::abs(mono[i] - mono[i - 1])));
@@ -165,21 +170,21 @@ TEST(VolumeRamp, ASineHasNoStepBeyondItsOwnAndTheRamps) {
 // A device that appears while the sound is off.
 TEST(VolumeRamp, AnythingThatBeginsWithTheSoundOffIsSilent) {
   VolumeRamp ramp(48000.0);
-  std::vector<float> mono(256, 1.0F);
-  ramp.apply(mono, 0.0);
+  std::vector<float> mono(256, 1.0F), other(256, 1.0F);
+  ramp.apply(mono, other, 0.0);
   for (const float x : mono) ASSERT_EQ(x, 0.0F);
 }
 
 TEST(SoundEngine, TheListenerHearsTheVolumeAndSeesWhatWasPlayed) {
   SoundEngine loud(SynthParams{}), half(SynthParams{});
   half.set_volume(0.5);
-  std::vector<float> a(300), b(300), heard;
+  std::vector<float> a(300), b(300), right(300), heard;
   CuttingState state = test::cortical_drill(1345);
   float level = 0.0F;
   for (int turn = 0; turn < 40; ++turn) {
     for (SoundEngine* engine : {&loud, &half}) engine->deliver(scene_of(state, 1));
-    loud.render(a);
-    half.render(b);
+    loud.render(a, right);
+    half.render(b, right);
     ++state.state_seq;
     heard.insert(heard.end(), b.begin(), b.end());
     for (const float x : b) level = std::max(level, std::abs(x));
@@ -205,6 +210,7 @@ struct StandInOutput final : AudioOutput {
   void stop() noexcept override {}
   std::chrono::nanoseconds latency() const noexcept override { return 7ms; }
   std::uint64_t gaps() const noexcept override { return 2; }
+  std::uint64_t late_callbacks() const noexcept override { return 5; }
   std::string failure_reason() const override { return why_; }
 
  private:
@@ -242,6 +248,7 @@ TEST(ReconnectingOutput, IsOpenedAgainAfterItsDeviceCameBack) {
   output.maintain(start + 13s, true);
   EXPECT_EQ(output.trouble(), "");
   EXPECT_EQ(output.gaps(), 4U) << "of both";
+  EXPECT_EQ(output.late_callbacks(), 10U) << "of both";
 }
 
 TEST(PacedOutput, AsksForFramesAtTheSoundCardsPace) {
@@ -273,6 +280,30 @@ TEST(PulseOutput, MissingSoundServerIsOneSentenceWithTheRemedy) {
   EXPECT_EQ(output.error().code, ErrorCode::unavailable);
   EXPECT_THAT(output.error().message, testing::HasSubstr("--output none"));
   EXPECT_THAT(output.error().message, testing::Not(testing::HasSubstr("\n")));
+  const auto devices = output_devices();
+  ASSERT_FALSE(devices);
+  EXPECT_EQ(devices.error().code, ErrorCode::unavailable);
+}
+
+TEST(OutputDevice, IsChosenByNameByNumberOrByTheServer) {
+  const std::vector<OutputDevice> sinks{{"Screen", 2, 48000, false},
+                                        {"Desk", 2, 44100, true},
+                                        {"1", 2, 48000, false},
+                                        {"Twin", 2, 48000, false},
+                                        {"Twin", 6, 48000, false}};
+  EXPECT_EQ(*chosen_device(sinks, ""), 1U);
+  EXPECT_EQ(*chosen_device(sinks, "Screen"), 0U);
+  EXPECT_EQ(*chosen_device(sinks, "4"), 4U);
+  EXPECT_EQ(*chosen_device(sinks, "1"), 2U) << "a name counts before a number";
+  EXPECT_EQ(*chosen_device({sinks.front()}, ""), 0U) << "no default";
+  for (const char* wrong : {"Twin", "5", "-1", "0x", "desk", " "}) {
+    const auto refused = chosen_device(sinks, wrong);
+    ASSERT_FALSE(refused) << wrong;
+    EXPECT_EQ(refused.error().code, ErrorCode::invalid_input);
+    EXPECT_THAT(refused.error().message,
+                testing::AllOf(testing::HasSubstr(wrong), testing::HasSubstr("osteon-audio devices")));
+  }
+  EXPECT_FALSE(chosen_device({}, ""));
 }
 
 TEST(OutputKind, UnknownNamesAreRefusedWithTheChoice) {
@@ -284,17 +315,51 @@ TEST(OutputKind, UnknownNamesAreRefusedWithTheChoice) {
 }
 
 TEST(WavRecorder, PathThatCannotBeWrittenIsNamed) {
-  const auto recorder = WavRecorder::open("/nowhere/at/all.wav", 48000);
+  const auto recorder = WavRecorder::open("/nowhere/at/all.wav", 48000, 2);
   ASSERT_FALSE(recorder);
   EXPECT_THAT(recorder.error().message, testing::HasSubstr("/nowhere/at/all.wav"));
 }
 
+// Whole frames, in their order, on both sides of the 256 frames that the queue takes at once.
+TEST(WavRecorder, ChannelsAreKeptApartOrAveraged) {
+  const test::TempDir temp;
+  std::vector<float> left(700), right(700);
+  for (std::size_t i = 0; i < left.size(); ++i) {
+    left[i] = static_cast<float>(i) / 1024.0F;
+    right[i] = -0.5F * left[i];
+  }
+  for (const int channels : {1, 2}) {
+    auto recorder = WavRecorder::open(temp / "a.wav", 48000, channels);
+    ASSERT_TRUE(recorder);
+    recorder->push(left, right);
+    ASSERT_TRUE(recorder->close());
+    EXPECT_EQ(recorder->frames_written(), left.size());
+    SF_INFO info{};
+    SNDFILE* file = sf_open((temp / "a.wav").c_str(), SFM_READ, &info);
+    ASSERT_NE(file, nullptr);
+    ASSERT_EQ(info.channels, channels);
+    ASSERT_EQ(static_cast<std::size_t>(info.frames), left.size());
+    std::vector<float> read(left.size() * static_cast<std::size_t>(channels));
+    sf_readf_float(file, read.data(), info.frames);
+    sf_close(file);
+    constexpr float kStep = 1.0F / 32768.0F;  // of 16 bits
+    for (std::size_t i = 0; i < left.size(); ++i) {
+      if (channels == 1) {
+        ASSERT_NEAR(read[i], 0.25F * left[i], kStep);
+      } else {
+        ASSERT_NEAR(read[2 * i], left[i], kStep);
+        ASSERT_NEAR(read[2 * i + 1], right[i], kStep);
+      }
+    }
+  }
+}
+
 TEST(WavRecorder, FullQueueIsCountedAndNeverWaits) {
   const test::TempDir temp;
-  auto recorder = WavRecorder::open(temp / "a.wav", 48000);
+  auto recorder = WavRecorder::open(temp / "a.wav", 48000, 2);
   ASSERT_TRUE(recorder);
   std::vector<float> second(48000, 0.25F);
-  for (int i = 0; i < 60; ++i) recorder->push(second);
+  for (int i = 0; i < 60; ++i) recorder->push(second, second);
   ASSERT_TRUE(recorder->close());
   EXPECT_EQ(recorder->frames_written() + recorder->frames_lost(), 60U * 48000U);
   SF_INFO info{};
@@ -302,7 +367,7 @@ TEST(WavRecorder, FullQueueIsCountedAndNeverWaits) {
   ASSERT_NE(file, nullptr);
   EXPECT_EQ(static_cast<std::uint64_t>(info.frames), recorder->frames_written());
   EXPECT_EQ(info.samplerate, 48000);
-  EXPECT_EQ(info.channels, 1);
+  EXPECT_EQ(info.channels, 2);
   sf_close(file);
 }
 

@@ -50,6 +50,7 @@ std::vector<Row> read_log(const std::filesystem::path& file, std::string& header
   return rows;
 }
 
+// The mean of both channels; nothing if the file has not two.
 std::vector<float> read_wav(const std::filesystem::path& file) {
   SF_INFO info{};
   SNDFILE* in = sf_open(file.c_str(), SFM_READ, &info);
@@ -57,7 +58,10 @@ std::vector<float> read_wav(const std::filesystem::path& file) {
   std::vector<float> samples(static_cast<std::size_t>(info.frames * info.channels));
   sf_readf_float(in, samples.data(), info.frames);
   sf_close(in);
-  return samples;
+  if (info.channels != 2) return {};
+  std::vector<float> mean(static_cast<std::size_t>(info.frames));
+  for (std::size_t i = 0; i < mean.size(); ++i) mean[i] = 0.5F * (samples[2 * i] + samples[2 * i + 1]);
+  return mean;
 }
 
 constexpr std::size_t kSilent_frames = 2000;
@@ -193,6 +197,20 @@ TEST_F(AudioProcess, StatesAreHeardLoggedAndRecorded) {
   EXPECT_EQ(sound::peak(std::span(heard).last(kSilent_frames)), 0) << "the recording ends in silence";
 }
 
+TEST_F(AudioProcess, HeadphonesHearBothEars) {
+  std::vector<std::string> with_headphones = arguments();
+  with_headphones.insert(with_headphones.end(), {"--listen", "headphones", "--listener", "0", "-400", "-300"});
+  test::Process audio(test::program("osteon-audio"), with_headphones);
+  ASSERT_TRUE(test::wait_until([&] { return audio.err().find("joined") != std::string::npos; }, 20s)) << audio.err();
+  send(numbered({{test::cortical_drill(1200), 1.0}}));
+  EXPECT_EQ(audio.terminate(), 0) << audio.err();
+  const nlohmann::json summary = nlohmann::json::parse(*read_file(temp_ / "a.json"));
+  EXPECT_EQ(summary["listen"], "headphones");
+  EXPECT_GT(summary["peak_left"], 0.01);
+  EXPECT_GT(summary["peak_right"], 0.01);
+  EXPECT_EQ(summary["wav_frames"], read_wav(temp_ / "a.wav").size());
+}
+
 TEST_F(AudioProcess, ServerThatGoesAwayIsOneSentenceAndAFinishedRecording) {
   test::Process audio(test::program("osteon-audio"), arguments());
   ASSERT_TRUE(test::wait_until([&] { return audio.err().find("joined") != std::string::npos; }, 20s)) << audio.err();
@@ -226,6 +244,15 @@ TEST(AudioProgram, WrongInputsAreOneSentenceEach) {
       {{"--server", "127.0.0.1:1", "--plain", "--output", "none", "--state-log", "/nowhere/a.csv"}, "/nowhere/a.csv"},
       {{"--server", "127.0.0.1:1", "--plain", "--output", "pulse"}, "--output none"},
       {{"--output", "none"}, "--server"},
+      {{"--server", "127.0.0.1:1", "--plain", "--output", "none", "--listen", "quadraphony"}, "--listen loudspeakers"},
+      {{"--server", "127.0.0.1:1", "--plain", "--output", "none", "--hrtf", "a.sofa"}, "--listen headphones"},
+      {{"--server", "127.0.0.1:1", "--plain", "--output", "none", "--listen", "headphones", "--hrtf", "/nowhere.sofa"},
+       "/nowhere.sofa"},
+      {{"--server", "127.0.0.1:1", "--plain", "--output", "none", "--listen", "headphones", "--hrtf", "/etc/passwd"},
+       "--hrtf another file"},
+      {{"--server", "127.0.0.1:1", "--plain", "--output", "none", "--listener", "0", "0", "0"}, "--listener"},
+      {{"--server", "127.0.0.1:1", "--plain", "--output", "none", "--device", "0"}, "--output pulse"},
+      {{"devices"}, "no sound server answers"},
   };
   for (const Case& wrong : cases) {
     test::ProcessOptions options;

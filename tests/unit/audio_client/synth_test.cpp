@@ -394,14 +394,18 @@ TEST(Limiter, LeavesWhatFitsAndHoldsWhatDoesNot) {
   for (int block = 0; block < 400; ++block) {
     // A tone that jumps from a quarter of full scale to four times full scale and back.
     const double amplitude = block / 100 % 2 ? 4.0 : 0.25;
-    Block frames;
+    StereoBlock frames;
     for (int i = 0; i < kBlockFrames; ++i) {
-      frames[static_cast<std::size_t>(i)] =
+      const auto at = static_cast<std::size_t>(i);
+      frames.left[at] =
           static_cast<float>(amplitude * std::sin(2 * std::numbers::pi * 440 * (block * kBlockFrames + i) / kRate_hz));
+      frames.right[at] = 0.125F * frames.left[at];
     }
     limiter.process(frames);
-    loudest = std::max(loudest, sound::peak(frames));
-    if (block == 50) softest = sound::peak(frames);
+    loudest = std::max(loudest, sound::peak(frames.left));
+    for (std::size_t i = 0; i < kBlockFrames; ++i)
+      ASSERT_NEAR(frames.right[i], 0.125F * frames.left[i], 1e-7F) << "both channels have one gain";
+    if (block == 50) softest = sound::peak(frames.left);
   }
   EXPECT_LT(loudest, 1.0);
   EXPECT_GT(loudest, 0.9);

@@ -27,6 +27,7 @@ SoundReport a_report() {
   report.buffer_ms = 5.25;
   report.latency_ms = 22.75;
   report.gaps = 3;
+  report.late_callbacks = 17;
   report.device = "PulseAudio";
   report.trouble = "the sound server \"größer\" went away";
   return report;
@@ -109,6 +110,7 @@ TEST(SoundMessage, EachFieldIsChecked) {
        {"buffer_ms", no_number(0, 1e6)},
        {"latency_ms", no_number(0, 1e6)},
        {"gaps", no_number(0, 1e15)},
+       {"late_callbacks", no_number(0, 1e15)},
        {"device", no_text},
        {"trouble", no_text}},
       [](const std::string& text) { return read_sound_report(text); });

@@ -1196,6 +1196,10 @@
         <translation>Aussetzer</translation>
     </message>
     <message>
+        <source>Late callbacks</source>
+        <translation>Verspätete Aufrufe</translation>
+    </message>
+    <message>
         <source>Device</source>
         <translation>Gerät</translation>
     </message>

@@ -1,0 +1,184 @@
+// The tools of a room for two ears: the mix, its silence, and that nothing is allocated meanwhile.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "audio_client/output/sound_engine.hpp"
+#include "audio_client/space/sofa_file.hpp"
+#include "audio_client/synth/drill_synth.hpp"
+#include "common/sound/levels.hpp"
+#include "tests/support/allocation_counter.hpp"
+#include "tests/unit/audio_client/ideal_head.hpp"
+#include "tests/unit/audio_client/scripted_drilling.hpp"
+
+namespace osteon::audio {
+namespace {
+
+using test::kRate_hz;
+
+Space usual_space(Listening way) {
+  Space space;
+  space.listening = way;
+  space.pose_bone_head = looking(usual_listener_mm(way), Vec3::Zero(), -Vec3::UnitY());
+  if (way == Listening::headphones)
+    space.hrtf = std::make_shared<const Hrtf>(
+        *Hrtf::make(test::sphere([](double along) { return 0.55 + 0.45 * along; }), kRate_hz));
+  return space;
+}
+
+ToolSound tool_at(const Vec3& tip_mm, std::uint64_t author, const CuttingState& state) {
+  ToolSound tool = tool_sound(state);
+  tool.author = author;
+  tool.tip_mm = tip_mm;
+  return tool;
+}
+
+SoundScene scene(const std::vector<ToolSound>& tools) {
+  SoundScene made;
+  for (const ToolSound& tool : tools) made.tools[static_cast<std::size_t>(made.count++)] = tool;
+  return made;
+}
+
+struct Sides {
+  std::vector<float> left, right;
+};
+
+Sides played(DrillSynth& synth, const std::vector<ToolSound>& tools, double seconds) {
+  Sides sides{std::vector<float>(static_cast<std::size_t>(seconds * kRate_hz)), {}};
+  sides.right.resize(sides.left.size());
+  synth.aim(scene(tools));
+  // Pieces that are no whole blocks.
+  for (std::size_t at = 0; at < sides.left.size(); at += 100) {
+    const std::size_t count = std::min<std::size_t>(100, sides.left.size() - at);
+    synth.process(std::span(sides.left).subspan(at, count), std::span(sides.right).subspan(at, count));
+  }
+  return sides;
+}
+
+DrillSynth synth_in(Listening way) {
+  DrillSynth synth;
+  synth.prepare({.rate_hz = kRate_hz, .seed = 3, .space = usual_space(way)});
+  return synth;
+}
+
+class StereoSynth : public testing::TestWithParam<Listening> {};
+INSTANTIATE_TEST_SUITE_P(Listening, StereoSynth,
+                         testing::Values(Listening::mono, Listening::loudspeakers, Listening::headphones));
+
+// Below the limiter's ceiling, two tools sound as the sum of each alone.
+TEST_P(StereoSynth, TwoToolsAddUp) {
+  const ToolSound one = tool_at({30, 0, 120}, 1, test::free_drill(1400));
+  const ToolSound two = tool_at({-20, 10, -150}, 2, test::cancellous_drill(1380));
+  DrillSynth a = synth_in(GetParam()), b = synth_in(GetParam()), both = synth_in(GetParam());
+  const Sides alone = played(a, {one}, 0.6), other = played(b, {two}, 0.6), together = played(both, {one, two}, 0.6);
+  ASSERT_LT(sound::peak(together.left), 0.9);
+  ASSERT_LT(sound::peak(together.right), 0.9);
+  EXPECT_GT(sound::peak(together.left), 0.02);
+  for (std::size_t n = 0; n < together.left.size(); ++n) {
+    ASSERT_NEAR(together.left[n], alone.left[n] + other.left[n], 1e-6) << n;
+    ASSERT_NEAR(together.right[n], alone.right[n] + other.right[n], 1e-6) << n;
+  }
+}
+
+TEST_P(StereoSynth, AToolIsHeardAtItsSide) {
+  DrillSynth synth = synth_in(GetParam());
+  const Sides sides = played(synth, {tool_at({0, 0, 200}, 1, test::cortical_drill(1345))}, 0.6);
+  const double apart_db = sound::rms_db(sides.left) - sound::rms_db(sides.right);
+  if (GetParam() == Listening::mono) {
+    EXPECT_EQ(sides.left, sides.right);
+  } else {
+    EXPECT_GT(apart_db, 3) << "the patient's head is at the usual listener's left";
+  }
+}
+
+// In the middle of the bone, at the usual distance, a drill is as loud as in mono.
+TEST_P(StereoSynth, TheMiddleHasTheLevelOfMono) {
+  DrillSynth synth = synth_in(GetParam()), mono = synth_in(Listening::mono);
+  const ToolSound drill = tool_at(Vec3::Zero(), 1, test::cortical_drill(1345));
+  const Sides sides = played(synth, {drill}, 1.0), plain = played(mono, {drill}, 1.0);
+  const double own_db = sound::rms_db(plain.left) + (GetParam() == Listening::headphones ? test::kToneGain_db : 0.0);
+  EXPECT_NEAR(sound::rms_db(sides.left), own_db, 0.1);
+  EXPECT_NEAR(sound::rms_db(sides.right), own_db, 0.1);
+}
+
+TEST_P(StereoSynth, TheSuckerIsHeardWhereItsToolIs) {
+  DrillSynth synth = synth_in(GetParam());
+  CuttingState state = test::idle_drill();
+  state.suction = true;
+  const Sides sides = played(synth, {tool_at({0, 0, -200}, 1, state)}, 1.0);
+  EXPECT_GT(sound::peak(sides.right), 0.002);
+  if (GetParam() != Listening::mono) {
+    EXPECT_GT(sound::rms_db(sides.right), sound::rms_db(sides.left) + 3);
+  }
+}
+
+TEST_P(StereoSynth, FallsSilentAfterTheLastSoundHasArrived) {
+  DrillSynth synth = synth_in(GetParam());
+  EXPECT_TRUE(synth.silent());
+  static_cast<void>(played(synth, {tool_at({0, 0, 2000}, 1, test::cortical_drill(1345))}, 0.3));
+  EXPECT_FALSE(synth.silent());
+  const Sides after = played(synth, {}, 2.0);
+  EXPECT_TRUE(synth.silent());
+  EXPECT_GT(sound::peak(after.left), 1e-3) << "it runs down";
+  EXPECT_EQ(sound::peak(std::span(after.left).last(4800)), 0);
+  EXPECT_EQ(sound::peak(std::span(after.right).last(4800)), 0);
+}
+
+TEST_P(StereoSynth, OneChannelIsTheMeanOfBoth) {
+  const ToolSound drill = tool_at({10, 20, 90}, 1, test::free_drill(1400));
+  DrillSynth synth = synth_in(GetParam()), single = synth_in(GetParam());
+  const Sides sides = played(synth, {drill}, 0.3);
+  std::vector<float> mono(sides.left.size());
+  single.aim(scene({drill}));
+  single.process(mono);
+  for (std::size_t n = 0; n < mono.size(); ++n) ASSERT_EQ(mono[n], 0.5F * (sides.left[n] + sides.right[n]));
+}
+
+// On the sound card's thread, with a tool that turns round the listener, and one that comes and goes.
+TEST_P(StereoSynth, TheEngineDoesNotAllocate) {
+  SoundEngine engine({.rate_hz = kRate_hz, .space = usual_space(GetParam())});
+  std::vector<float> left(256), right(256);
+  const test::AllocationCounter heap;
+  for (int i = 0; i < 400; ++i) {
+    SoundScene now;
+    now.tools[0] = ToolSound{};
+    now.tools[0].author = 1;
+    now.tools[0].state_seq = static_cast<std::uint64_t>(i);
+    now.tools[0].rpm = 1300;
+    now.tools[0].load = 0.5;
+    now.tools[0].tip_mm = Vec3(-100 + 300 * std::cos(0.1 * i), -100, 300 * std::sin(0.1 * i));
+    now.tools[1] = now.tools[0];
+    now.tools[1].author = 2;
+    now.tools[1].suction = true;
+    now.count = 1 + i / 50 % 2;
+    engine.deliver(now);
+    engine.render(left, right);
+  }
+  EXPECT_EQ(heap.count(), 0);
+  EXPECT_GT(engine.peak(), 0.01F);
+}
+
+// The way of the sound is in what the engine states: half a metre takes 1.46 ms.
+TEST(StereoEngine, StatedLatencyHasTheWayToTheListener) {
+  for (const Listening way : {Listening::mono, Listening::loudspeakers, Listening::headphones}) {
+    SoundEngine engine({.rate_hz = kRate_hz, .space = usual_space(way)});
+    std::vector<float> left(4096), right(4096);
+    engine.deliver(scene({tool_at(Vec3::Zero(), 1, test::free_drill(1400))}));
+    engine.render(left, right);
+    const auto first = std::ranges::find_if(left, [](float x) { return x != 0; }) - left.begin();
+    const double stated = std::chrono::duration<double>(engine.latency()).count() * kRate_hz;
+    // The cubic between frames begins two frames before, and the ramp of the sound starts at zero.
+    EXPECT_GE(static_cast<double>(first), stated - 3);
+    EXPECT_LE(static_cast<double>(first), stated + 5);
+  }
+}
+
+}  // namespace
+}  // namespace osteon::audio
