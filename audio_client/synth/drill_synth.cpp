@@ -1,52 +1,82 @@
 #include "audio_client/synth/drill_synth.hpp"
 
 #include <algorithm>
+#include <string_view>
 
+#include "audio_client/presets/preset_file.hpp"
 #include "common/core/check.hpp"
+#include "common/tools/tool.hpp"
+#include "common/tools/tool_file.hpp"
 
 namespace osteon::audio {
 
 void DrillSynth::prepare(const SynthParams& params) {
   OSTEON_CHECK(params.rate_hz > 0);
   params_ = params;
-  for (int kind = 0; kind < kHandpieceKinds; ++kind) {
-    handpieces_[static_cast<std::size_t>(kind)] = make_handpiece(static_cast<HandpieceKind>(kind));
-  }
+  std::vector<ToolModel> presets = params.presets;
+  presets.insert(presets.end(), builtin_presets().begin(), builtin_presets().end());
+  const auto made = [&](std::string_view name, std::string_view kind, const Tool* tool) {
+    const ToolModel* model = preset_for(presets, name, kind);
+    return make_handpiece(model ? *model : *preset_for(presets, "", "drill"), tool, params.rate_hz);
+  };
+  pieces_.clear();
+  for (const Tool& tool : builtin_tools())
+    if (preset_for(presets, tool.name, kind_name(tool.kind)))
+      pieces_.push_back({tool.name, made(tool.name, kind_name(tool.kind), &tool)});
+  std::ranges::sort(pieces_, {}, &Piece::tool);
+  unknown_ = {made("", "drill", nullptr), made("", "round-burr", nullptr)};
+  suction_.prepare(params.suction, *preset_for(presets, "suction", ""), params.rate_hz, params.seed);
   reset();
 }
 
 void DrillSynth::reset() noexcept {
   voices_.fill(Voice{});
-  suction_.prepare(params_.suction, params_.rate_hz, params_.seed);
+  suction_.reset();
   limiter_.reset();
   block_.fill(0.0F);
   used_ = kBlockFrames;
   tail_blocks_ = 0;
 }
 
+const Handpiece& DrillSynth::handpiece_of(const ToolSound& tool) const noexcept {
+  const auto known = std::ranges::lower_bound(pieces_, tool.tool, {}, [](const Piece& p) { return std::string_view(p.tool); });
+  return known != pieces_.end() && known->tool == tool.tool ? known->handpiece
+                                                            : unknown_[static_cast<std::size_t>(tool.handpiece)];
+}
+
+// The voice of this tool, or one that starts; null if there is none, or nothing to hear.
+Voice* DrillSynth::voice_for(const ToolSound& tool) noexcept {
+  const Handpiece& handpiece = handpiece_of(tool);
+  const bool struck = handpiece.model.drive == Drive::blows;
+  const auto same = std::ranges::find_if(voices_, [&](const Voice& v) {
+    return (v.sounding() || struck) && v.author() == tool.author && v.handpiece() == &handpiece;
+  });
+  if (same != voices_.end()) {
+    same->aim(tool);
+    return &*same;
+  }
+  // At rest there is no sound. But the voice of a tool that is struck must know how many blows there were.
+  if (tool.rpm == 0 && !struck) return nullptr;
+  const auto free = std::ranges::find_if(voices_, [](const Voice& v) { return !v.handpiece(); });
+  if (free == voices_.end()) return nullptr;
+  free->start(handpiece, params_.voice, params_.rate_hz, tool, params_.seed + tool.author);
+  return &*free;
+}
+
 void DrillSynth::aim(const SoundScene& scene) noexcept {
   std::array<bool, kVoices> aimed{};
   const auto tools = std::span(scene.tools).first(static_cast<std::size_t>(scene.count));
   suction_.aim(std::ranges::any_of(tools, &ToolSound::suction));
-  for (int t = 0; t < scene.count; ++t) {
-    const ToolSound& tool = scene.tools[static_cast<std::size_t>(t)];
-    const auto same = std::find_if(voices_.begin(), voices_.end(), [&](const Voice& v) {
-      return v.sounding() && v.author() == tool.author && v.kind() == tool.handpiece;
-    });
-    if (same != voices_.end()) {
-      same->aim(tool);
-      aimed[static_cast<std::size_t>(same - voices_.begin())] = true;
-      continue;
-    }
-    if (tool.rpm == 0) continue;  // at rest: no sound
-    const auto free = std::find_if(voices_.begin(), voices_.end(), [](const Voice& v) { return !v.sounding(); });
-    if (free == voices_.end()) continue;
-    free->start(handpieces_[static_cast<std::size_t>(tool.handpiece)], params_.voice, params_.rate_hz, tool,
-                params_.seed + tool.author);
-    aimed[static_cast<std::size_t>(free - voices_.begin())] = true;
-  }
+  for (Voice& voice : voices_)
+    if (voice.handpiece() && !voice.sounding() && voice.handpiece()->model.drive != Drive::blows) voice = Voice{};
+  for (const ToolSound& tool : tools)
+    if (const Voice* voice = voice_for(tool)) aimed[static_cast<std::size_t>(voice - voices_.data())] = true;
   for (std::size_t v = 0; v < voices_.size(); ++v) {
-    if (voices_[v].sounding() && !aimed[v]) voices_[v].release();
+    if (aimed[v] || !voices_[v].handpiece()) continue;
+    if (voices_[v].sounding())
+      voices_[v].release();
+    else
+      voices_[v] = Voice{};
   }
 }
 

@@ -3,6 +3,8 @@
 #include <array>
 #include <cstdint>
 #include <span>
+#include <string>
+#include <vector>
 
 #include "audio_client/synth/handpiece.hpp"
 #include "audio_client/synth/limiter.hpp"
@@ -17,6 +19,7 @@ struct SynthParams {
   std::uint64_t seed = 1;
   VoiceParams voice;
   SuctionParams suction;
+  std::vector<ToolModel> presets;  // the user's; they go before those that come with Osteon
 };
 
 class DrillSynth {
@@ -38,10 +41,18 @@ class DrillSynth {
   // When a tool is exchanged, the old one runs down while the new one sounds. So there are more voices than tools.
   static constexpr int kVoices = 2 * kMaxTools;
 
+  struct Piece {
+    std::string tool;
+    Handpiece handpiece;
+  };
+
   void render_block() noexcept;
+  [[nodiscard]] const Handpiece& handpiece_of(const ToolSound& tool) const noexcept;
+  [[nodiscard]] Voice* voice_for(const ToolSound& tool) noexcept;
 
   SynthParams params_;
-  std::array<Handpiece, kHandpieceKinds> handpieces_;
+  std::vector<Piece> pieces_;                           // of all known tools, by name; voices point into it
+  std::array<Handpiece, kHandpieceKinds> unknown_;      // of other tools
   std::array<Voice, kVoices> voices_;
   SuctionSound suction_;  // one for all suckers of the room
   Limiter limiter_;
