@@ -1,4 +1,5 @@
-// osteon-audio: joins a room and plays the sound of its tools, or analyses or models a recording.
+// osteon-audio: joins a room and plays the sound of its tools. Or it analyses or models a recording, or makes a preset
+// of it.
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
@@ -16,9 +17,11 @@
 #include <system_error>
 #include <thread>
 #include <utility>
+#include <vector>
 
 #include "audio_client/app/analyse_command.hpp"
 #include "audio_client/app/model_command.hpp"
+#include "audio_client/app/preset_command.hpp"
 #include "audio_client/net/state_subscription.hpp"
 #include "audio_client/output/audio_output.hpp"
 #include "audio_client/output/reconnecting_output.hpp"
@@ -52,6 +55,7 @@ struct Options {
   wire::CredentialArguments credentials;
   std::string output = "pulse";
   std::filesystem::path wav_file, state_log_file, summary_file, window;
+  std::vector<std::filesystem::path> presets;
   double patience_s = 5;
 };
 
@@ -192,9 +196,12 @@ Result<void> run(const Options& options, const StopSignal& stop) {
   if (Result<void> usable = check_writable(options.state_log_file, "the state log", "--state-log"); !usable)
     return usable;
   if (Result<void> usable = check_writable(options.wav_file, "the recording", "--wav"); !usable) return usable;
+  Result<std::vector<audio::ToolModel>> presets = audio::presets_of(options.presets);
+  if (!presets) return tl::unexpected(presets.error());
   std::optional<audio::WavRecorder> recorder;
   audio::SynthParams synth_params;
   synth_params.rate_hz = output_params.rate_hz;
+  synth_params.presets = std::move(*presets);
   audio::SoundEngine engine(synth_params);
   Result<Window> window = Window::connect(options);
   if (!window) return tl::unexpected(window.error());
@@ -288,6 +295,7 @@ int main(int argc, char** argv) {
   std::function<Result<std::string>()> command;
   audio::add_analyse_command(app, command);
   audio::add_model_commands(app, command);
+  audio::add_preset_command(app, command);
   app.require_subcommand(0, 1);
   app.add_option("--server", options.server, "HOST:PORT of osteon-server; needed to play");
   app.add_option("--room", options.room, "Name of the room; not needed where the server has one");
@@ -295,6 +303,9 @@ int main(int argc, char** argv) {
   wire::add_credential_options(app, options.credentials);
   app.add_option("--output", options.output, "pulse: PulseAudio's default sink; none: at the same pace to nowhere")
       ->capture_default_str();
+  app.add_option("--preset", options.presets,
+                 "Preset of a tool's sound, or a folder of presets, which go before those of Osteon; may be repeated")
+      ->allow_extra_args(false);
   app.add_option("--wav", options.wav_file, "Record the sound: 48 kHz, 16 bit, mono");
   app.add_option("--state-log", options.state_log_file,
                  "CSV: when each cutting state was received and when it was played");
