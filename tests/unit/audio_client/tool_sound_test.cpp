@@ -22,121 +22,49 @@
 #include "common/sound/wavelet_packets.hpp"
 #include "common/tools/tool.hpp"
 #include "tests/support/allocation_counter.hpp"
-#include "tests/unit/audio_client/scripted_drilling.hpp"
+#include "tests/unit/audio_client/played_tools.hpp"
 
 namespace osteon::audio {
 namespace {
 
+using test::cancellous_tool;
+using test::cortical_tool;
+using test::cutting_tool;
+using test::free_tool;
+using test::kLinesAlone;
 using test::kRate_hz;
+using test::kThrough_s;
+using test::played_drilling;
+using test::Player;
+using test::sound_part;
+using test::steadily;
 
 constexpr sound::Gearbox kGears;
 
-ToolSound sound_of(const CuttingState& state) {
-  ToolSound tool = tool_sound(state);
-  tool.torque_Nmm = state.torque_Nmm;
-  tool.tool = "drill-3.2";
-  return tool;
-}
-ToolSound free_tool() { return sound_of(test::free_drill(1400)); }
-ToolSound cancellous_tool() { return sound_of(test::cancellous_drill(1380)); }
-ToolSound cortical_tool() { return sound_of(test::cortical_drill(1345)); }
-
-// A tool of the box in cortical bone.
-ToolSound cutting_tool(std::string_view name, double rpm) {
-  ToolSound tool = cortical_tool();
-  tool.tool = name;
-  tool.rpm = rpm;
-  tool.torque_Nmm = 0;
-  return tool;
-}
-
-class Player {
- public:
-  explicit Player(std::uint64_t seed = 1, const VoiceParams& voice = {}, std::vector<ToolModel> presets = {}) {
-    synth_.prepare({.rate_hz = kRate_hz, .seed = seed, .voice = voice, .suction = {}, .presets = std::move(presets)});
-  }
-  // Plays states of 1/120 s each.
-  std::vector<float> play(const ToolSound& tool, double seconds) {
-    std::vector<float> samples(static_cast<std::size_t>(std::lround(seconds * 120.0)) * test::kFramesPerState);
-    SoundScene scene;
-    scene.count = 1;
-    scene.tools[0] = tool;
-    for (std::size_t at = 0; at < samples.size(); at += test::kFramesPerState) {
-      synth_.aim(scene);
-      synth_.process(std::span(samples).subspan(at, test::kFramesPerState));
-    }
-    return samples;
-  }
-  std::vector<float> unaimed(double seconds) {
-    std::vector<float> samples(static_cast<std::size_t>(seconds * kRate_hz));
-    synth_.process(samples);
-    return samples;
-  }
-  DrillSynth& synth() { return synth_; }
-
- private:
-  DrillSynth synth_;
-};
-
-std::vector<float> steadily(const ToolSound& tool) {
-  Player player;
-  static_cast<void>(player.play(tool, 0.75));
-  return player.play(tool, 1.0);
-}
-
-constexpr VoiceParams kLinesAlone{.noise = 0, .flutter = 0};
-
-// Free, cancellous, cortical, through the far cortex, free: 1.5 s each, as one sound.
-struct Drilling {
-  std::vector<float> samples;
-  static constexpr double kPart_s = 1.5, kThrough_s = 4 * kPart_s;
-};
-Drilling drilling() {
-  Player player;
-  Drilling made;
-  const auto add = [&](const std::vector<float>& part) {
-    made.samples.insert(made.samples.end(), part.begin(), part.end());
-  };
-  add(player.play(free_tool(), Drilling::kPart_s));
-  add(player.play(cancellous_tool(), Drilling::kPart_s));
-  add(player.play(cortical_tool(), 2 * Drilling::kPart_s));
-  ToolSound plunge = free_tool();
-  plunge.advancing = true;
-  plunge.load = 0.02;
-  add(player.play(plunge, 0.1));
-  add(player.play(free_tool(), Drilling::kPart_s));
-  return made;
-}
-
-std::span<const float> part(const std::vector<float>& samples, double from_s, double seconds) {
-  return std::span(samples).subspan(static_cast<std::size_t>(from_s * kRate_hz),
-                                    static_cast<std::size_t>(seconds * kRate_hz));
-}
-
 // 8.6.3: 3 dB to 5 dB are an obvious difference in loudness.
 TEST(NiuDrilling, EnergyRisesFromFreeToPerforationWhichIsTheLoudestMoment) {
-  const Drilling made = drilling();
-  const double free_db = sound::rms_db(part(made.samples, 0.75, 0.7)),
-               cancellous_db = sound::rms_db(part(made.samples, 2.0, 0.9)),
-               cortical_db = sound::rms_db(part(made.samples, 4.0, 1.9)),
-               perforation_db = sound::rms_db(part(made.samples, Drilling::kThrough_s, 0.1));
+  const std::vector<float> samples = played_drilling();
+  const double free_db = sound::rms_db(sound_part(samples, 0.75, 0.7)),
+               cancellous_db = sound::rms_db(sound_part(samples, 2.0, 0.9)),
+               cortical_db = sound::rms_db(sound_part(samples, 4.0, 1.9)),
+               perforation_db = sound::rms_db(sound_part(samples, kThrough_s, 0.1));
   std::printf("  free %.1f, cancellous %.1f, cortical %.1f, perforation %.1f dB\n", free_db, cancellous_db, cortical_db,
               perforation_db);
   EXPECT_GT(cancellous_db, free_db + 3.0);
   EXPECT_GT(cortical_db, cancellous_db + 3.0);
   EXPECT_GT(perforation_db, cortical_db + 3.0);
 
-  const std::vector<double> levels = sound::block_levels_db(made.samples, 2400);
+  const std::vector<double> levels = sound::block_levels_db(samples, 2400);
   const auto loudest = std::ranges::max_element(levels) - levels.begin();
-  EXPECT_NEAR(0.05 * static_cast<double>(loudest), Drilling::kThrough_s + 0.05, 0.1);
+  EXPECT_NEAR(0.05 * static_cast<double>(loudest), kThrough_s + 0.05, 0.1);
 }
 
 TEST(NiuDrilling, PerforationIsABurstNear200Hz) {
-  const Drilling made = drilling();
+  const std::vector<float> samples = played_drilling();
   const sound::Spectrum burst =
-      sound::power_spectrum(part(made.samples, Drilling::kThrough_s + 0.005, 0.085), kRate_hz, 4096);
+      sound::power_spectrum(sound_part(samples, kThrough_s + 0.005, 0.085), kRate_hz, 4096);
   EXPECT_NEAR(sound::strongest_peaks(burst, 1, 50.0).front().hz, 200.0, 30.0);
-  const sound::Spectrum before = sound::power_spectrum(part(made.samples, 5.0, 0.9), kRate_hz);
+  const sound::Spectrum before = sound::power_spectrum(sound_part(samples, 5.0, 0.9), kRate_hz);
   EXPECT_GT(sound::band_db(burst, 100, 300), sound::band_db(before, 100, 300) + 10.0);
   // The burst is heard up to the band of 689 to 1378 Hz.
   EXPECT_GT(sound::band_db(burst, 0, 1378), sound::band_db(before, 0, 1378) + 5.0);
@@ -165,9 +93,9 @@ TEST(NiuDrilling, TheLowBandRisesFromFreeToCortical) {
 }
 
 TEST(NiuDrilling, TheLowerHalfOfTheFrequenciesHasMoreEnergy) {
-  const Drilling made = drilling();
-  for (const double from_s : {0.75, 2.0, 4.0, Drilling::kThrough_s}) {
-    const std::vector<float> low = sound::resampled(part(made.samples, from_s, 0.5), kRate_hz, 22050);
+  const std::vector<float> samples = played_drilling();
+  for (const double from_s : {0.75, 2.0, 4.0, kThrough_s}) {
+    const std::vector<float> low = sound::resampled(sound_part(samples, from_s, 0.5), kRate_hz, 22050);
     const std::vector<double> shares = sound::energy_shares(sound::wavelet_packets(low, 22050, 1), 1);
     std::printf("  from %.2f s: A1 %.2f, D1 %.2f\n", from_s, shares[0], shares[1]);
     EXPECT_GT(shares[0], 1.5 * shares[1]) << from_s;
