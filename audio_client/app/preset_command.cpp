@@ -45,12 +45,11 @@ Result<std::string> run_preset(const PresetArguments& a) {
     std::string kinds;
     for (const ToolModel& model : builtin_presets())
       for (const std::string& kind : model.tools) kinds += (kinds.empty() ? "" : ", ") + kind;
-    return bad_input("--tool \"" + bounded_text(a.tool, 60) + "\" is no tool that sounds; give the name of a tool, or " +
-                     "one of " + kinds);
+    return bad_input("--tool \"" + bounded_text(a.tool, 60) +
+                     "\" is no tool that sounds; give the name of a tool, or " + "one of " + kinds);
   }
   std::error_code ignored;
-  if (std::filesystem::weakly_canonical(a.out, ignored) ==
-      std::filesystem::weakly_canonical(a.recording.file, ignored))
+  if (std::filesystem::weakly_canonical(a.out, ignored) == std::filesystem::weakly_canonical(a.recording.file, ignored))
     return bad_input(a.out + " would lose what is read; give --out another file");
   if (std::filesystem::is_other(a.out, ignored))
     return bad_input("cannot write the preset " + a.out + ": it is a device or a pipe; give --out a file");
@@ -81,8 +80,9 @@ Result<std::vector<ToolModel>> presets_of(const std::vector<std::filesystem::pat
     if (!loaded) return tl::unexpected(loaded.error());
     for (ToolModel& model : *loaded) {
       if (std::ranges::none_of(model.tools, known_tool))
-        return bad_input(file.string() + ": the \"tools\" of the preset " + model.name + " name no known tool, such as " +
-                         bounded_text(model.tools.front(), 60) + "; write kinds such as drill, or names of tools");
+        return bad_input(file.string() + ": the \"tools\" of the preset " + model.name +
+                         " name no known tool, such as " + bounded_text(model.tools.front(), 60) +
+                         "; write kinds such as drill, or names of tools");
       presets.push_back(std::move(model));
     }
   }

@@ -50,8 +50,8 @@ Result<std::vector<ToolModel>> load_presets(const std::filesystem::path& file_or
          !error && entry != std::filesystem::directory_iterator(); entry.increment(error))
       if (entry->path().extension() == ".yaml") files.push_back(entry->path());
     if (error)
-      return failure(ErrorCode::unavailable, file_or_folder.string() + " cannot be read (" + error.message() +
-                                                 "); check its permissions");
+      return failure(ErrorCode::unavailable,
+                     file_or_folder.string() + " cannot be read (" + error.message() + "); check its permissions");
     if (files.empty())
       return failure(ErrorCode::not_found,
                      file_or_folder.string() + " has no preset; give a folder with *.yaml files, or a file");

@@ -233,8 +233,8 @@ void read_transients(MapReader& in, ToolModel& model) {
                         " samples of 16 bits each, which is 20 ms; shorten it"};
     std::vector<float> samples(bytes.size() / 2);
     for (std::size_t i = 0; i < samples.size(); ++i)
-      samples[i] = static_cast<float>(static_cast<std::int16_t>(bytes.data()[2 * i] | bytes.data()[2 * i + 1] << 8)) /
-                   32768.0F;
+      samples[i] =
+          static_cast<float>(static_cast<std::int16_t>(bytes.data()[2 * i] | bytes.data()[2 * i + 1] << 8)) / 32768.0F;
     all += samples.size();
     model.transients.push_back(std::move(samples));
   }
@@ -288,7 +288,9 @@ class MapWriter {
     std::snprintf(text.data(), text.size(), level ? "%.2f" : "%.7g", value);
     out_ << YAML::Key << key << YAML::Value << text.data();
   }
-  void whole(const char* key, int value, int /*low*/, int /*high*/) { out_ << YAML::Key << key << YAML::Value << value; }
+  void whole(const char* key, int value, int /*low*/, int /*high*/) {
+    out_ << YAML::Key << key << YAML::Value << value;
+  }
   template <class Part>
   void map(const char* key, Part& part) {
     out_ << YAML::Key << key << YAML::Value << YAML::BeginMap;

@@ -23,8 +23,8 @@ constexpr int kRate_hz = kPresetTransientRate_hz;
 constexpr double kLowest_hz = 60.0, kHighest_hz = 10000.0;
 constexpr std::size_t kRecordedLines = 48;
 constexpr double kLineRange_db = 50.0, kQuietestLine_db = -90.0;
-constexpr double kSpeedReach = 0.03;  // the speed that the user gives may be wrong by so much
-constexpr double kLineReach = 0.01;   // of a gear's line, within which a line is the gear's
+constexpr double kSpeedReach = 0.03;   // the speed that the user gives may be wrong by so much
+constexpr double kLineReach = 0.01;    // of a gear's line, within which a line is the gear's
 constexpr double kShiftReach = 0.025;  // of a line, by which a load moves it
 constexpr std::size_t kRing = 2048;    // samples of a part of the ringing
 constexpr double kSettle_s = 0.005;    // after a blow, before its ringing is measured
@@ -147,8 +147,8 @@ std::vector<NoisePoint> noise_of(std::span<const float> residual) {
 }
 
 // What a material changes against the free part: for each source the power near its lines, and the noise.
-void learn_material(Material& material, const ToolModel& model, std::span<const float> free,
-                    std::span<const float> cut, std::span<const float> free_noise, std::span<const float> cut_noise) {
+void learn_material(Material& material, const ToolModel& model, std::span<const float> free, std::span<const float> cut,
+                    std::span<const float> free_noise, std::span<const float> cut_noise) {
   const sound::Spectrum before = sound::power_spectrum(free, kRate_hz), after = sound::power_spectrum(cut, kRate_hz);
   for (std::size_t s = 0; s < kLineSources; ++s) {
     double was = 0, is = 0;
@@ -160,8 +160,7 @@ void learn_material(Material& material, const ToolModel& model, std::span<const 
       }
     if (was > 0) material.change_db[s] = std::clamp(applied_change(sound::power_db(is / was)), -60.0, 60.0);
   }
-  material.noise_db =
-      std::clamp(applied_change(sound::rms_db(cut_noise) - sound::rms_db(free_noise)), -60.0, 60.0);
+  material.noise_db = std::clamp(applied_change(sound::rms_db(cut_noise) - sound::rms_db(free_noise)), -60.0, 60.0);
 }
 
 Result<RecordedPreset> turning(std::span<const float> x, const ToolModel& base, const RecordedParams& params) {
@@ -174,8 +173,9 @@ Result<RecordedPreset> turning(std::span<const float> x, const ToolModel& base, 
     for (const auto state : {DrillingState::cancellous, DrillingState::cortical})
       if (!free) free = longest(states, state);
   if (!free || free->to_s - free->from_s < 0.1)
-    return bad_input("no tool runs in the recording for 0.1 s or more; choose a part by --from and --to, or record "
-                     "nearer to the tool");
+    return bad_input(
+        "no tool runs in the recording for 0.1 s or more; choose a part by --from and --to, or record "
+        "nearer to the tool");
   sound::SpectralParams spectral;
   spectral.partials.peaks.refinements = params.refinements;
   const sound::SpectralAnalysis analysis = sound::spectral_analysis(x, kRate_hz, spectral);
@@ -190,7 +190,8 @@ Result<RecordedPreset> turning(std::span<const float> x, const ToolModel& base, 
   for (const FoundPeak& line : found) {
     const double order = line.hz * 60.0 / model.rated_rpm;
     if (order >= 0.001 && order <= 10000.0)
-      model.lines.push_back({.order = order, .teeth = 0, .source = source_at(orders, order), .level_db = line.level_db});
+      model.lines.push_back(
+          {.order = order, .teeth = 0, .source = source_at(orders, order), .level_db = line.level_db});
   }
   std::size_t known = 0;
   for (const Line& line : model.lines) known += line.source == LineSource::body ? 0 : 1;
@@ -200,8 +201,8 @@ Result<RecordedPreset> turning(std::span<const float> x, const ToolModel& base, 
   model.noise = noise_of(free_noise);
   made.text += said("noise      %zu points, %.0f to %.0f Hz\n", model.noise.size(), model.noise.front().hz,
                     model.noise.back().hz);
-  for (auto [state, material] : {std::pair{DrillingState::cancellous, &model.cancellous},
-                                 std::pair{DrillingState::cortical, &model.cortical}}) {
+  for (auto [state, material] :
+       {std::pair{DrillingState::cancellous, &model.cancellous}, std::pair{DrillingState::cortical, &model.cortical}}) {
     const auto cut = longest(states, state);
     if (!cut || cut->from_s == free->from_s || cut->to_s - cut->from_s < 0.1) continue;
     learn_material(*material, model, free_sound, part_of(x, *cut), free_noise, part_of(analysis.residual, *cut));
@@ -233,8 +234,9 @@ Result<RecordedPreset> struck(std::span<const float> x, const ToolModel& base, c
   sound::Spectrum early, late;
   ringing_of(x, analysis.impacts, early, late);
   if (early.power.empty())
-    return bad_input("no blow is in the recording that rings for 0.2 s before the next; choose a part by --from and "
-                     "--to, or give --tool a tool that turns");
+    return bad_input(
+        "no blow is in the recording that rings for 0.2 s before the next; choose a part by --from and "
+        "--to, or give --tool a tool that turns");
   BlowParams& blow = made.model.blow;
   blow.modes.clear();
   blow.contact_s = 1e-5;  // the levels are those that were heard, with the contact's own spectrum
@@ -246,8 +248,7 @@ Result<RecordedPreset> struck(std::span<const float> x, const ToolModel& base, c
     const double decay_s = std::clamp(8.685889638 * window_s / std::max(0.1, fall_db), 0.003, 1.0);
     // The window's middle is half a window after its begin; so much louder was the mode then.
     const double then_db = std::min(30.0, 8.685889638 * (kSettle_s + 0.5 * window_s) / decay_s);
-    blow.modes.push_back(
-        {peak.hz, decay_s, std::min(0.0, peak.level_db + sound::power_db(2.0 / blows) + then_db)});
+    blow.modes.push_back({peak.hz, decay_s, std::min(0.0, peak.level_db + sound::power_db(2.0 / blows) + then_db)});
   }
   made.text += said("blows      %zu\nmodes      %zu\n", analysis.impacts.size(), blow.modes.size());
   for (const sound::Transient& transient : analysis.model.transients)

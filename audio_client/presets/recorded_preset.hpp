@@ -26,7 +26,7 @@ struct RecordedPreset {
 // there are any, give the changes of each source, with the threshold of 3 dB. A tool that is struck: the ringing after
 // the blows gives the modes, and the blows themselves are kept, at most 20 ms each and a tenth of the recording.
 // Error: invalid_input if nothing runs, or nothing strikes.
-[[nodiscard]] Result<RecordedPreset> recorded_preset(std::span<const float> samples, int rate_hz,
-                                                     const ToolModel& base, const RecordedParams& params);
+[[nodiscard]] Result<RecordedPreset> recorded_preset(std::span<const float> samples, int rate_hz, const ToolModel& base,
+                                                     const RecordedParams& params);
 
 }  // namespace osteon::audio

@@ -85,10 +85,10 @@ struct BladeParams {
 struct BlowParams {
   double impulse_N_s = 2.8;  // of the reference blow
   double contact_s = 0.0004;
-  double rise = 0.4;          // by which seating raises all frequencies, loose to seated
-  double click_db = -200;     // of the contact, amplitude at its begin
-  double click_s = 0.0015;    // its decay
-  std::vector<Mode> modes;    // loose
+  double rise = 0.4;        // by which seating raises all frequencies, loose to seated
+  double click_db = -200;   // of the contact, amplitude at its begin
+  double click_s = 0.0015;  // its decay
+  std::vector<Mode> modes;  // loose
 };
 
 // Breakthrough: what gives way rings, and the lines stay loud for a moment.

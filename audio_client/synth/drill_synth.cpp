@@ -39,7 +39,8 @@ void DrillSynth::reset() noexcept {
 }
 
 const Handpiece& DrillSynth::handpiece_of(const ToolSound& tool) const noexcept {
-  const auto known = std::ranges::lower_bound(pieces_, tool.tool, {}, [](const Piece& p) { return std::string_view(p.tool); });
+  const auto known =
+      std::ranges::lower_bound(pieces_, tool.tool, {}, [](const Piece& p) { return std::string_view(p.tool); });
   return known != pieces_.end() && known->tool == tool.tool ? known->handpiece
                                                             : unknown_[static_cast<std::size_t>(tool.handpiece)];
 }

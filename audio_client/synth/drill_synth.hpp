@@ -51,8 +51,8 @@ class DrillSynth {
   [[nodiscard]] Voice* voice_for(const ToolSound& tool) noexcept;
 
   SynthParams params_;
-  std::vector<Piece> pieces_;                           // of all known tools, by name; voices point into it
-  std::array<Handpiece, kHandpieceKinds> unknown_;      // of other tools
+  std::vector<Piece> pieces_;                       // of all known tools, by name; voices point into it
+  std::array<Handpiece, kHandpieceKinds> unknown_;  // of other tools
   std::array<Voice, kVoices> voices_;
   SuctionSound suction_;  // one for all suckers of the room
   Limiter limiter_;

@@ -37,15 +37,14 @@ SpindleParams at_spindle(const Motor& motor, double rated_rpm) {
 Gains material_gains(const ToolModel& model, double load, double hardness, double perforated) noexcept {
   const Material &soft = model.cancellous, &hard = model.cortical;
   const double density = hardness * kHardest_g_cm3;
-  const double way =
-      std::clamp((density - soft.density_g_cm3) / (hard.density_g_cm3 - soft.density_g_cm3), 0.0, 1.0);
+  const double way = std::clamp((density - soft.density_g_cm3) / (hard.density_g_cm3 - soft.density_g_cm3), 0.0, 1.0);
   const double softer = std::clamp(density / soft.density_g_cm3, 0.0, 1.0);  // than the softest of the table
   const double part = softer * std::clamp(load / std::lerp(soft.load, hard.load, way), 0.0, kMostLoad);
   Gains gains;
   for (std::size_t s = 0; s < gains.source.size(); ++s) {
     const bool teeth = static_cast<LineSource>(s) == LineSource::teeth;
-    const double full = amplitude_of_db(
-        std::lerp(applied_change(soft.change_db[s]), applied_change(hard.change_db[s]), way));
+    const double full =
+        amplitude_of_db(std::lerp(applied_change(soft.change_db[s]), applied_change(hard.change_db[s]), way));
     const double through = amplitude_of_db(applied_change(model.perforation.change_db[s]));
     // Teeth sound only while they cut.
     const double cut = teeth ? part * full : 1.0 + part * (full - 1.0);

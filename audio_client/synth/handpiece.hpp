@@ -24,8 +24,8 @@ inline constexpr int kHandpieceKinds = 2;
 struct Partial {
   double ratio = 1;  // its frequency as a multiple of the spindle's
   LineSource source = LineSource::shaft;
-  double level = 0;          // amplitude when running free at rated speed; of teeth, in bone without a change
-  double rated_gain = 1;     // radiation() at rated speed
+  double level = 0;       // amplitude when running free at rated speed; of teeth, in bone without a change
+  double rated_gain = 1;  // radiation() at rated speed
 };
 
 inline constexpr int kMaxPartials = static_cast<int>(kMostLines);

@@ -10,8 +10,8 @@
 namespace osteon::audio {
 
 struct SuctionParams {
-  double level = 1.0;     // factor on the preset's noise
-  double swell_s = 0.06;  // time constant of swelling and fading
+  double level = 1.0;      // factor on the preset's noise
+  double swell_s = 0.06;   // time constant of swelling and fading
   double bubble_s = 0.03;  // of the gurgling [A]
 };
 

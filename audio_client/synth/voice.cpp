@@ -25,7 +25,7 @@ constexpr double kKnockLoad = 0.25;  // a smaller load gives way without a sound
 
 // Each tooth breaks its own chips. Below this frequency that is a rattle; above, a tone that the partials make.
 constexpr double kRattle_hz = 400.0;
-constexpr double kMostBlow = 3.0;               // of the reference blow
+constexpr double kMostBlow = 3.0;  // of the reference blow
 constexpr double kLowestPlate_hz = 60.0;
 
 double share(double seconds, double rate_hz) { return 1.0 - std::exp(-kBlockFrames / (seconds * rate_hz)); }
@@ -171,7 +171,8 @@ void Voice::advance_controls() noexcept {
   load_ += k * (target_.load - load_);
   hardness_ += k * (target_.hardness - hardness_);
   chips_ += k * (target_.chips - chips_);
-  if (target_.cortex_mm > 0) cortex_mm_ = cortex_mm_ > 0 ? cortex_mm_ + k * (target_.cortex_mm - cortex_mm_) : target_.cortex_mm;
+  if (target_.cortex_mm > 0)
+    cortex_mm_ = cortex_mm_ > 0 ? cortex_mm_ + k * (target_.cortex_mm - cortex_mm_) : target_.cortex_mm;
   recent_load_ = std::max(target_.load, recent_load_ * (1.0 - share(kRecentLoad_s, rate_hz_)));
   perforated_ *= 1.0 - share(handpiece_->model.perforation.fade_s, rate_hz_);
   gains_ = material_gains(handpiece_->model, load_, hardness_, perforated_);
@@ -212,7 +213,8 @@ void Voice::tune_cut() noexcept {
   // The chips of hard bone are smaller and stiffer, so their noise has a higher frequency.
   const double hz = std::lerp(model.chips.soft_hz, model.chips.hard_hz, std::min(1.0, hardness_));
   chip_filter_.set(hz, rate_hz_, model.chips.quality);
-  chip_to_ = static_cast<float>(band_gain(flow * amplitude_of_db(model.chips.level_db), hz, model.chips.quality, rate_hz_));
+  chip_to_ =
+      static_cast<float>(band_gain(flow * amplitude_of_db(model.chips.level_db), hz, model.chips.quality, rate_hz_));
   plate_to_ = 0;
   if (cortex_mm_ > 0 && target_.cortex_mm > 0) {
     const double plate_hz =
@@ -236,11 +238,13 @@ void Voice::add_cut(Block& block) noexcept {
   const bool strokes = model.drive == Drive::strokes;
   const double turns = rpm_ / 60.0 / rate_hz_ * (strokes ? 1.0 : handpiece_->teeth);
   const double rattles = strokes ? 1.0 : std::clamp(2.0 - turns * rate_hz_ / kRattle_hz, 0.0, 1.0);
-  const auto depth = static_cast<float>(model.chips.depth * rattles), lopsided = static_cast<float>(model.chips.lopsided);
+  const auto depth = static_cast<float>(model.chips.depth * rattles),
+             lopsided = static_cast<float>(model.chips.lopsided);
   const double end = turns_ * (strokes ? 1.0 : handpiece_->teeth) - kBlockFrames * turns, phase = end - std::floor(end);
   auto re = static_cast<float>(std::cos(kTurn * phase)), im = static_cast<float>(std::sin(kTurn * phase));
   const auto c = static_cast<float>(std::cos(kTurn * turns)), s = static_cast<float>(std::sin(kTurn * turns));
-  const float chip_step = (chip_to_ - chip_level_) / kBlockFrames, plate_step = (plate_to_ - plate_level_) / kBlockFrames,
+  const float chip_step = (chip_to_ - chip_level_) / kBlockFrames,
+              plate_step = (plate_to_ - plate_level_) / kBlockFrames,
               blade_step = (blade_to_ - blade_level_) / kBlockFrames;
   for (float& x : block) {
     const float white = noise_.next();

@@ -81,8 +81,7 @@ int main() {
                cancellous_db = sound::rms_db(sound_part(samples, 2.0, 0.9)),
                cortical_db = sound::rms_db(sound_part(samples, 4.0, 1.9)),
                through_db = sound::rms_db(sound_part(samples, kThrough_s, 0.1));
-  const sound::Spectrum burst =
-      sound::power_spectrum(sound_part(samples, kThrough_s + 0.005, 0.085), kRate_hz, 4096);
+  const sound::Spectrum burst = sound::power_spectrum(sound_part(samples, kThrough_s + 0.005, 0.085), kRate_hz, 4096);
   const nlohmann::json numbers = {
       {"cancellous", cancellous_db - free_db},
       {"cortical", cortical_db - cancellous_db},
@@ -90,8 +89,8 @@ int main() {
       {"burst_off", std::abs(sound::strongest_peaks(burst, 1, 50.0).front().hz - 200.0)},
       {"motor_in_cortical", motor_lead_db(cortical_tool())},
       {"gear_in_cancellous", -motor_lead_db(cancellous_tool())},
-      {"low_band", std::min(low_db(cancellous_tool()) - low_db(free_tool()),
-                            low_db(cortical_tool()) - low_db(cancellous_tool()))},
+      {"low_band",
+       std::min(low_db(cancellous_tool()) - low_db(free_tool()), low_db(cortical_tool()) - low_db(cancellous_tool()))},
       {"low_half", low_half(samples)},
       {"shift_error", 100.0 * shift_error()},
       {"speed", synthesis_speed()},

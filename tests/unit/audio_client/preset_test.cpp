@@ -75,9 +75,9 @@ TEST(Preset, AWrittenFileGivesTheSameAgain) {
 TEST(Preset, ItsLinesComeFromTheGearTable) {
   std::vector<double> orders;
   for (const Line& line : preset_of("drill").lines) orders.push_back(line.order);
-  for (const double order : {kDrillGears.motor(), kDrillGears.output_mesh(), kDrillGears.motor_mesh(),
-                             3.0 * sound::kCommutatorSegments * kDrillGears.motor(),
-                             kDrillGears.output_mesh() + kDrillGears.output_spin()})
+  for (const double order :
+       {kDrillGears.motor(), kDrillGears.output_mesh(), kDrillGears.motor_mesh(),
+        3.0 * sound::kCommutatorSegments * kDrillGears.motor(), kDrillGears.output_mesh() + kDrillGears.output_spin()})
     EXPECT_TRUE(std::ranges::any_of(orders, [&](double o) { return std::abs(o - order) < 1e-9; })) << order;
 }
 
@@ -141,11 +141,10 @@ struct KnownLine {
 
 TEST(RecordedPreset, HasTheLinesAndTheNoiseOfTheRecordingAndPlaysThem) {
   const double rpm = 1425;
-  const std::vector<KnownLine> lines = {
-      {kDrillGears.output_mesh(), -32, LineSource::output_mesh},
-      {kDrillGears.motor_mesh(), -28, LineSource::motor_mesh},
-      {3 * sound::kCommutatorSegments * kDrillGears.motor(), -30, LineSource::motor},
-      {61.7, -36, LineSource::body}};
+  const std::vector<KnownLine> lines = {{kDrillGears.output_mesh(), -32, LineSource::output_mesh},
+                                        {kDrillGears.motor_mesh(), -28, LineSource::motor_mesh},
+                                        {3 * sound::kCommutatorSegments * kDrillGears.motor(), -30, LineSource::motor},
+                                        {61.7, -36, LineSource::body}};
   std::vector<float> recording = sound::white_noise(0.002, 4 * 44100, 1);
   for (const KnownLine& line : lines)
     recording = sound::added(recording, sound::tone(line.order * rpm / 60.0, std::pow(10.0, 0.05 * line.level_db),
@@ -168,9 +167,10 @@ TEST(RecordedPreset, HasTheLinesAndTheNoiseOfTheRecordingAndPlaysThem) {
   tool.rpm = made->model.rated_rpm;
   const std::vector<float> played = play_tool(made->model, tool, 2.0);
   for (const KnownLine& line : lines)
-    EXPECT_NEAR(sound::tone_db(played, 48000, sound::find_tone(played, 48000, line.order * rpm / 60 - 8,
-                                                                line.order * rpm / 60 + 8).hz),
-                line.level_db, 1.0)
+    EXPECT_NEAR(
+        sound::tone_db(played, 48000,
+                       sound::find_tone(played, 48000, line.order * rpm / 60 - 8, line.order * rpm / 60 + 8).hz),
+        line.level_db, 1.0)
         << line.order;
   // White noise of this RMS has 2 s^2 / rate in each hertz.
   const double density_db = 10 * std::log10(2 * 0.002 * 0.002 / kRecorded_hz);
@@ -213,8 +213,8 @@ TEST(RecordedPreset, OfBlowsHasTheirModesAndTheirImpacts) {
   const auto made = recorded_preset(recording, 44100, preset_of("broach"), {.name = "mine", .tools = {}});
   ASSERT_TRUE(made) << made.error().message;
   for (const auto& [hz, amplitude] : {std::pair{700.0, 0.3}, std::pair{1900.0, 0.2}}) {
-    const auto mode = std::ranges::min_element(made->model.blow.modes, {},
-                                               [&](const Mode& m) { return std::abs(m.hz - hz); });
+    const auto mode =
+        std::ranges::min_element(made->model.blow.modes, {}, [&](const Mode& m) { return std::abs(m.hz - hz); });
     EXPECT_NEAR(mode->hz, hz, 10.0);
     EXPECT_NEAR(mode->decay_s, decay_s, 0.25 * decay_s);
     EXPECT_NEAR(mode->level_db, 20 * std::log10(amplitude), 2.5);
@@ -226,7 +226,8 @@ TEST(RecordedPreset, OfBlowsHasTheirModesAndTheirImpacts) {
   }
   EXPECT_GT(made->model.transients.size(), 0U);
   EXPECT_LE(static_cast<double>(stored), 0.1 * 4 * 22050);
-  ASSERT_TRUE(parse_preset(to_yaml(made->model), "a.yaml")) << parse_preset(to_yaml(made->model), "a.yaml").error().message;
+  ASSERT_TRUE(parse_preset(to_yaml(made->model), "a.yaml"))
+      << parse_preset(to_yaml(made->model), "a.yaml").error().message;
 }
 
 class PresetProgram : public testing::Test {
@@ -269,7 +270,8 @@ TEST_F(PresetProgram, WrongUseIsOneSentenceEach) {
   fs::create_directory(temp_ / "empty");
   ASSERT_EQ(::mkfifo(path("pipe").c_str(), 0600), 0);
   const auto played = [&](const std::string& preset) {
-    return std::vector<std::string>{"--server", "127.0.0.1:1", "--output", "none", "--timeout", "0", "--preset", preset};
+    return std::vector<std::string>{"--server",  "127.0.0.1:1", "--output", "none",
+                                    "--timeout", "0",           "--preset", preset};
   };
   const std::vector<std::pair<std::vector<std::string>, std::vector<const char*>>> cases = {
       {{"preset", wav()}, {"--out"}},
@@ -284,7 +286,8 @@ TEST_F(PresetProgram, WrongUseIsOneSentenceEach) {
       {played(path("empty")), {"empty has no preset"}},
       {played(path("pipe")), {"there is no preset", "pipe"}},
       {played(put("damaged.yaml", good + "motor: {most_Nmm: -3}\n")), {"damaged.yaml", "\"motor.most_Nmm\" is \"-3\""}},
-      {played(put("spoon.yaml", "name: a\ntools: [spoon]\ndrive: rotation\nrated_rpm: 9\n")), {"spoon.yaml", "\"tools\""}},
+      {played(put("spoon.yaml", "name: a\ntools: [spoon]\ndrive: rotation\nrated_rpm: 9\n")),
+       {"spoon.yaml", "\"tools\""}},
   };
   const std::string recorded = test::content(temp_ / "drill.wav");
   for (const auto& [arguments, says] : cases) {

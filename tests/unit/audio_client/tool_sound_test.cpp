@@ -61,8 +61,7 @@ TEST(NiuDrilling, EnergyRisesFromFreeToPerforationWhichIsTheLoudestMoment) {
 
 TEST(NiuDrilling, PerforationIsABurstNear200Hz) {
   const std::vector<float> samples = played_drilling();
-  const sound::Spectrum burst =
-      sound::power_spectrum(sound_part(samples, kThrough_s + 0.005, 0.085), kRate_hz, 4096);
+  const sound::Spectrum burst = sound::power_spectrum(sound_part(samples, kThrough_s + 0.005, 0.085), kRate_hz, 4096);
   EXPECT_NEAR(sound::strongest_peaks(burst, 1, 50.0).front().hz, 200.0, 30.0);
   const sound::Spectrum before = sound::power_spectrum(sound_part(samples, 5.0, 0.9), kRate_hz);
   EXPECT_GT(sound::band_db(burst, 100, 300), sound::band_db(before, 100, 300) + 10.0);
