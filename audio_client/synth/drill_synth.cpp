@@ -45,39 +45,31 @@ const Handpiece& DrillSynth::handpiece_of(const ToolSound& tool) const noexcept 
                                                             : unknown_[static_cast<std::size_t>(tool.handpiece)];
 }
 
-// The voice of this tool, or one that starts; null if there is none, or nothing to hear.
-Voice* DrillSynth::voice_for(const ToolSound& tool) noexcept {
-  const Handpiece& handpiece = handpiece_of(tool);
-  const bool struck = handpiece.model.drive == Drive::blows;
-  const auto same = std::ranges::find_if(voices_, [&](const Voice& v) {
-    return (v.sounding() || struck) && v.author() == tool.author && v.handpiece() == &handpiece;
-  });
-  if (same != voices_.end()) {
-    same->aim(tool);
-    return &*same;
-  }
-  // At rest there is no sound. But the voice of a tool that is struck must know how many blows there were.
-  if (tool.rpm == 0 && !struck) return nullptr;
-  const auto free = std::ranges::find_if(voices_, [](const Voice& v) { return !v.handpiece(); });
-  if (free == voices_.end()) return nullptr;
-  free->start(handpiece, params_.voice, params_.rate_hz, tool, params_.seed + tool.author);
-  return &*free;
-}
-
 void DrillSynth::aim(const SoundScene& scene) noexcept {
   std::array<bool, kVoices> aimed{};
   const auto tools = std::span(scene.tools).first(static_cast<std::size_t>(scene.count));
   suction_.aim(std::ranges::any_of(tools, &ToolSound::suction));
-  for (Voice& voice : voices_)
-    if (voice.handpiece() && !voice.sounding() && voice.handpiece()->model.drive != Drive::blows) voice = Voice{};
-  for (const ToolSound& tool : tools)
-    if (const Voice* voice = voice_for(tool)) aimed[static_cast<std::size_t>(voice - voices_.data())] = true;
+  for (int t = 0; t < scene.count; ++t) {
+    const ToolSound& tool = scene.tools[static_cast<std::size_t>(t)];
+    const Handpiece& handpiece = handpiece_of(tool);
+    const auto same = std::find_if(voices_.begin(), voices_.end(), [&](const Voice& v) {
+      return (v.sounding() || v.waits()) && v.author() == tool.author && v.handpiece() == &handpiece;
+    });
+    if (same != voices_.end()) {
+      same->aim(tool);
+      aimed[static_cast<std::size_t>(same - voices_.begin())] = true;
+      continue;
+    }
+    // At rest there is no sound. But the voice of a tool that is struck must know how many blows there were.
+    if (tool.rpm == 0 && handpiece.model.drive != Drive::blows) continue;
+    const auto free =
+        std::find_if(voices_.begin(), voices_.end(), [](const Voice& v) { return !v.sounding() && !v.waits(); });
+    if (free == voices_.end()) continue;
+    free->start(handpiece, params_.voice, params_.rate_hz, tool, params_.seed + tool.author);
+    aimed[static_cast<std::size_t>(free - voices_.begin())] = true;
+  }
   for (std::size_t v = 0; v < voices_.size(); ++v) {
-    if (aimed[v] || !voices_[v].handpiece()) continue;
-    if (voices_[v].sounding())
-      voices_[v].release();
-    else
-      voices_[v] = Voice{};
+    if ((voices_[v].sounding() || voices_[v].waits()) && !aimed[v]) voices_[v].release();
   }
 }
 

@@ -48,7 +48,6 @@ class DrillSynth {
 
   void render_block() noexcept;
   [[nodiscard]] const Handpiece& handpiece_of(const ToolSound& tool) const noexcept;
-  [[nodiscard]] Voice* voice_for(const ToolSound& tool) noexcept;
 
   SynthParams params_;
   std::vector<Piece> pieces_;                       // of all known tools, by name; voices point into it

@@ -100,6 +100,7 @@ void Voice::start(const Handpiece& handpiece, const VoiceParams& params, double 
   target_.author = tool.author;
   target_.handpiece = tool.handpiece;
   blows_ = tool.blows;
+  waits_ = handpiece.model.drive == Drive::blows;
   aim(tool);
 }
 
@@ -118,8 +119,9 @@ void Voice::aim(const ToolSound& tool) noexcept {
 }
 
 void Voice::release() noexcept {
-  target_.rpm = target_.load = target_.hardness = target_.chips = target_.torque_Nmm = 0;
-  if (handpiece_) motor_.aim(0, 0);
+  target_.rpm = target_.load = target_.hardness = target_.chips = 0;
+  motor_.aim(0, 0);
+  waits_ = false;
 }
 
 // A layer gives way: the load is gone from a tool that advances, or that advanced one state ago and is through. A tool
@@ -160,7 +162,8 @@ void Voice::add_to(Block& block) noexcept {
   burst_.add_to(block);
   modes_.add_to(block);
   add_click(block);
-  sounding_ = rpm_ > 0 || target_.rpm > 0 || burst_.ringing() || modes_.ringing() || click_level_ > 0;
+  const bool driven = rpm_ > 0 || target_.rpm > 0 || motor_.stalled();
+  sounding_ = driven || burst_.ringing() || modes_.ringing() || click_level_ > 0;
 }
 
 void Voice::advance_controls() noexcept {

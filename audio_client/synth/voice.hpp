@@ -30,6 +30,8 @@ class Voice {
   void add_to(Block& block) noexcept;        // the next kBlockFrames
 
   [[nodiscard]] bool sounding() const noexcept { return sounding_; }
+  // Silent perhaps, but another tool must not take it: it has counted the blows on its tool.
+  [[nodiscard]] bool waits() const noexcept { return waits_; }
   [[nodiscard]] std::uint64_t author() const noexcept { return target_.author; }
   [[nodiscard]] const Handpiece* handpiece() const noexcept { return handpiece_; }  // null: never started
   [[nodiscard]] double rpm() const noexcept { return rpm_; }
@@ -47,7 +49,7 @@ class Voice {
   VoiceParams params_;
   double rate_hz_ = 48000;
   ToolSound target_;
-  bool sounding_ = false;
+  bool sounding_ = false, waits_ = false;
   WhiteNoise noise_;
 
   SpindleMotor motor_;

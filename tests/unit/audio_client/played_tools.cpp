@@ -28,7 +28,12 @@ audio::ToolSound cutting_tool(std::string_view name, double rpm) {
 }
 
 Player::Player(std::uint64_t seed, const audio::VoiceParams& voice, std::vector<audio::ToolModel> presets) {
-  synth_.prepare({.rate_hz = kRate_hz, .seed = seed, .voice = voice, .suction = {}, .presets = std::move(presets)});
+  audio::SynthParams params;
+  params.rate_hz = kRate_hz;
+  params.seed = seed;
+  params.voice = voice;
+  params.presets = std::move(presets);
+  synth_.prepare(params);
 }
 
 std::vector<float> Player::play(const audio::ToolSound& tool, double seconds) {

@@ -122,7 +122,10 @@ TEST(Preset, ADamagedOneIsOneSentence) {
 
 std::vector<float> play_tool(const ToolModel& model, const ToolSound& tool, double seconds) {
   DrillSynth synth;
-  synth.prepare({.rate_hz = 48000, .seed = 1, .voice = {.flutter = 0}, .suction = {}, .presets = {model}});
+  SynthParams params;
+  params.voice.flutter = 0;
+  params.presets = {model};
+  synth.prepare(params);
   SoundScene scene;
   scene.count = 1;
   scene.tools[0] = tool;

@@ -176,6 +176,7 @@ TEST(SpindleMotor, AStalledDrillIsSilentAndComesBack) {
   stalled.rpm = 0;
   stalled.torque_Nmm = 600;
   static_cast<void>(player.play(stalled, 0.5));
+  EXPECT_FALSE(player.synth().silent()) << "it is driven";
   EXPECT_LT(sound::rms_db(player.play(stalled, 0.25)), -80.0);
   static_cast<void>(player.play(free_tool(), 0.5));
   const double mesh_hz = kGears.output_mesh() * 1400 / 60.0;
