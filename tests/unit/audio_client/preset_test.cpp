@@ -273,7 +273,7 @@ TEST_F(PresetProgram, WrongUseIsOneSentenceEach) {
   fs::create_directory(temp_ / "empty");
   ASSERT_EQ(::mkfifo(path("pipe").c_str(), 0600), 0);
   const auto played = [&](const std::string& preset) {
-    return std::vector<std::string>{"--server",  "127.0.0.1:1", "--output", "none",
+    return std::vector<std::string>{"--server",  "127.0.0.1:1", "--plain",  "--output", "none",
                                     "--timeout", "0",           "--preset", preset};
   };
   const std::vector<std::pair<std::vector<std::string>, std::vector<const char*>>> cases = {
