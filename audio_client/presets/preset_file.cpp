@@ -8,9 +8,10 @@
 #include <cmath>
 #include <cstdio>
 #include <optional>
+#include <string>
 #include <system_error>
-#include <type_traits>
 #include <utility>
+#include <vector>
 
 #include "audio_client/presets/preset_fields.hpp"
 #include "common/core/bounded_text.hpp"
@@ -18,8 +19,6 @@
 
 namespace osteon::audio {
 namespace {
-
-namespace fs = std::filesystem;
 
 constexpr std::array<std::string_view, 3> kDrives = {"rotation", "strokes", "blows"};
 constexpr std::array<std::string_view, kLineSources> kSourceNames = {"shaft",       "motor", "motor-mesh",
@@ -46,31 +45,29 @@ std::string one_of(const Names& names) {
 // A map of a preset. Each field that is read is crossed off, and what is left at the end is refused.
 class MapReader {
  public:
-  static constexpr bool kReads = true;
-
   MapReader(const YAML::Node& node, std::string path) : path_(std::move(path)) {
     if (!node.IsMap()) throw PresetFault{where("") + "must be lines such as \"hz: 200\""};
     for (const auto& entry : node) {
       if (!entry.first.IsScalar()) throw PresetFault{where("") + "has a field whose name is no text; remove it"};
       const std::string key = entry.first.Scalar();
-      if (std::ranges::any_of(fields_, [&](const auto& field) { return field.first == key; }))
+      if (std::ranges::any_of(fields_, [&](const Field& field) { return field.key == key; }))
         throw PresetFault{where(key) + "is there twice; remove one"};
-      fields_.emplace_back(key, entry.second);
+      fields_.push_back({key, entry.second});
     }
   }
 
   void finish() const {
-    if (fields_.empty()) return;
-    throw PresetFault{where(fields_.front().first) + "is not known here; remove it or choose one of " + one_of(known_)};
+    const auto left = std::ranges::find(fields_, false, &Field::taken);
+    if (left == fields_.end()) return;
+    throw PresetFault{where(left->key) + "is not known here; remove it or choose one of " + one_of(known_)};
   }
 
   [[nodiscard]] std::optional<YAML::Node> take(const std::string& key) {
     known_.push_back(key);
-    const auto at = std::ranges::find(fields_, key, &std::pair<std::string, YAML::Node>::first);
+    const auto at = std::ranges::find(fields_, key, &Field::key);
     if (at == fields_.end()) return std::nullopt;
-    const YAML::Node node = at->second;
-    fields_.erase(at);
-    return node;
+    at->taken = true;
+    return at->node;
   }
   [[nodiscard]] YAML::Node need(const std::string& key, const char* remedy) {
     const std::optional<YAML::Node> node = take(key);
@@ -140,8 +137,13 @@ class MapReader {
   }
 
  private:
+  struct Field {
+    std::string key;
+    YAML::Node node;  // never assigned: that would change the document
+    bool taken = false;
+  };
   std::string path_;
-  std::vector<std::pair<std::string, YAML::Node>> fields_;
+  std::vector<Field> fields_;
   std::vector<std::string> known_;
 };
 
@@ -279,7 +281,6 @@ ToolModel read_model(const YAML::Node& root) {
 // Writes what MapReader reads.
 class MapWriter {
  public:
-  static constexpr bool kReads = false;
   explicit MapWriter(YAML::Emitter& out) : out_(out) {}
 
   void number(const char* key, double value, double /*low*/, double /*high*/) {
