@@ -55,7 +55,7 @@ struct Options {
   wire::CredentialArguments credentials;
   std::string output = "pulse";
   std::filesystem::path wav_file, state_log_file, summary_file, window;
-  std::vector<std::filesystem::path> presets;
+  std::vector<std::string> presets;
   double patience_s = 5;
 };
 

@@ -3,6 +3,7 @@
 #include <CLI/CLI.hpp>
 
 #include <algorithm>
+#include <filesystem>
 #include <memory>
 #include <utility>
 
@@ -73,16 +74,15 @@ Result<std::string> run_preset(const PresetArguments& a) {
 
 }  // namespace
 
-Result<std::vector<ToolModel>> presets_of(const std::vector<std::filesystem::path>& files) {
+Result<std::vector<ToolModel>> presets_of(const std::vector<std::string>& files) {
   std::vector<ToolModel> presets;
-  for (const std::filesystem::path& file : files) {
+  for (const std::string& file : files) {
     auto loaded = load_presets(file);
     if (!loaded) return tl::unexpected(loaded.error());
     for (ToolModel& model : *loaded) {
       if (std::ranges::none_of(model.tools, known_tool))
-        return bad_input(file.string() + ": the \"tools\" of the preset " + model.name +
-                         " name no known tool, such as " + bounded_text(model.tools.front(), 60) +
-                         "; write kinds such as drill, or names of tools");
+        return bad_input(file + ": the \"tools\" of the preset " + model.name + " name no known tool, such as " +
+                         bounded_text(model.tools.front(), 60) + "; write kinds such as drill, or names of tools");
       presets.push_back(std::move(model));
     }
   }

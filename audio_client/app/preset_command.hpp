@@ -1,6 +1,5 @@
 // osteon-audio preset: a recording as a preset, and the option --preset, by which the sound of the tools is played.
 #pragma once
-#include <filesystem>
 #include <functional>
 #include <string>
 #include <vector>
@@ -19,6 +18,6 @@ void add_preset_command(CLI::App& app, std::function<Result<std::string>()>& cho
 
 // The presets of all these files and folders, in their order. A preset for no known tool is refused, since it would
 // never be heard. Errors: one sentence.
-[[nodiscard]] Result<std::vector<ToolModel>> presets_of(const std::vector<std::filesystem::path>& files);
+[[nodiscard]] Result<std::vector<ToolModel>> presets_of(const std::vector<std::string>& files);
 
 }  // namespace osteon::audio

@@ -7,6 +7,7 @@
 #include <charconv>
 #include <cmath>
 #include <cstdio>
+#include <functional>
 #include <optional>
 #include <string>
 #include <system_error>
@@ -197,7 +198,8 @@ void read_line(MapReader& in, ToolModel& model) {
     line.order = in.number_of(*order, "order", 0.001, 10000.0);
   }
   if (source) line.source = source_of(in, *source, "source");
-  if (!(line.order + line.teeth >= 0.001 && line.order + line.teeth <= 10000.0))
+  // Tools have two teeth or more.
+  if (const double least = line.order + 2.0 * line.teeth; !(least >= 0.001 && least <= 10000.0))
     throw PresetFault{in.where("of") + "gives an order below 0.001 or above 10000; change \"times\" or \"side\""};
   line.level_db = in.number_of(in.need("level_db", "write the level, such as -40"), "level_db", kNoLevel_db, 0.0);
   model.lines.push_back(line);
@@ -262,7 +264,7 @@ ToolModel read_model(const YAML::Node& root) {
   in.map("motor", model.motor);
   in.each("lines", 0, kMostLines, [&](MapReader& line) { read_line(line, model); });
   in.list("noise", model.noise, 2, kMostNoisePoints);
-  if (!std::ranges::is_sorted(model.noise, [](const auto& a, const auto& b) { return a.hz <= b.hz; }))
+  if (std::ranges::adjacent_find(model.noise, std::ranges::greater_equal{}, &NoisePoint::hz) != model.noise.end())
     throw PresetFault{in.where("noise") + "must go from low to high \"hz\", each higher than the one before"};
   in.map("chips", model.chips);
   in.map("cancellous", model.cancellous);

@@ -24,7 +24,9 @@ void DrillSynth::prepare(const SynthParams& params) {
     if (preset_for(presets, tool.name, kind_name(tool.kind)))
       pieces_.push_back({tool.name, made(tool.name, kind_name(tool.kind), &tool)});
   std::ranges::sort(pieces_, {}, &Piece::tool);
-  unknown_ = {made("", "drill", nullptr), made("", "round-burr", nullptr)};
+  const Result<Tool> drill = find_tool("drill-3.2"), burr = find_tool("burr-round-5");
+  OSTEON_CHECK(drill && burr);
+  unknown_ = {made("", "drill", &*drill), made("", "round-burr", &*burr)};
   suction_.prepare(params.suction, *preset_for(presets, "suction", ""), params.rate_hz, params.seed);
   reset();
 }

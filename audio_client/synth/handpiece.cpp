@@ -48,7 +48,7 @@ Gains material_gains(const ToolModel& model, double load, double hardness, doubl
     const double through = amplitude_of_db(applied_change(model.perforation.change_db[s]));
     // Teeth sound only while they cut.
     const double cut = teeth ? part * full : 1.0 + part * (full - 1.0);
-    gains.source[s] = std::max({0.0, cut, teeth ? perforated * through : 1.0 + perforated * (through - 1.0)});
+    gains.source[s] = std::max({0.0, cut, perforated * through});
   }
   const double noise = amplitude_of_db(std::lerp(applied_change(soft.noise_db), applied_change(hard.noise_db), way));
   gains.noise = std::max(0.0, 1.0 + part * (noise - 1.0));
@@ -63,6 +63,7 @@ Handpiece make_handpiece(const ToolModel& model, const Tool* tool, double rate_h
   piece.teeth = model.teeth > 0 ? model.teeth : tool && tool->teeth > 0 ? tool->teeth : 2;
   for (const Line& line : model.lines) {
     const double ratio = line.order + line.teeth * piece.teeth;
+    if (ratio <= 0) continue;  // a sideband below a tool's only tooth
     piece.partials.push_back({.ratio = ratio,
                               .source = line.source,
                               .level = amplitude_of_db(line.level_db),

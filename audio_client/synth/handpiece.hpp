@@ -47,7 +47,7 @@ struct Handpiece {
   std::vector<std::vector<float>> clicks;      // the recording's impacts at the synthesis's rate
 };
 
-// `tool`: null for one that is not known; it has two teeth then, and no blade.
+// `tool`: null for none; then there are two teeth, and no blade but the preset's own.
 [[nodiscard]] Handpiece make_handpiece(const ToolModel& model, const Tool* tool, double rate_hz);
 
 // The motor with its gear, seen from the spindle: torques times reduction and efficiency, speeds through the reduction.

@@ -236,7 +236,7 @@ void Voice::add_cut(Block& block) noexcept {
   if (air_level_ > 0 || air_to > 0) air_.add_to(block, noise_, air_level_, air_to);
   air_level_ = air_to;
   tune_cut();
-  if (chip_level_ == 0 && chip_to_ == 0 && plate_level_ == 0 && plate_to_ == 0) return;
+  if (chip_level_ + chip_to_ + plate_level_ + plate_to_ + blade_level_ + blade_to_ == 0) return;
 
   const bool strokes = model.drive == Drive::strokes;
   const double turns = rpm_ / 60.0 / rate_hz_ * (strokes ? 1.0 : handpiece_->teeth);

@@ -54,7 +54,7 @@ TEST(Handpiece, RadiatesBestInTheMiddleBand) {
 }
 
 TEST(NoiseBank, HasTheDensityOfItsPoints) {
-  const std::vector<NoisePoint> points = {{250, -70}, {500, -60}, {1000, -66}, {2000, -60}, {4000, -75}, {8000, -70}};
+  const std::vector<NoisePoint> points = {{250, -70}, {500, -64}, {1000, -66}, {2000, -62}, {4000, -66}, {8000, -70}};
   NoiseBank bank;
   bank.prepare(points, 48000);
   WhiteNoise white(3);
