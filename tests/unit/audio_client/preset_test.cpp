@@ -5,9 +5,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <numbers>
+#include <random>
 #include <string>
 #include <utility>
 #include <vector>
@@ -15,6 +17,8 @@
 #include "audio_client/presets/preset_file.hpp"
 #include "audio_client/presets/recorded_preset.hpp"
 #include "audio_client/synth/drill_synth.hpp"
+#include "audio_client/synth/handpiece.hpp"
+#include "audio_client/synth/voice.hpp"
 #include "common/sound/gearbox.hpp"
 #include "common/sound/levels.hpp"
 #include "common/sound/spectrum.hpp"
@@ -118,6 +122,61 @@ TEST(Preset, ADamagedOneIsOneSentence) {
     for (const char* words : says) EXPECT_THAT(model.error().message, HasSubstr(words));
     EXPECT_EQ(model.error().message.find('\n'), std::string::npos);
   }
+}
+
+// Bytes changed, lost, or put elsewhere at random: a preset is refused by one sentence, or it can be played.
+TEST(Preset, DamageAtRandomIsASentenceOrASound) {
+  std::mt19937 random(1);
+  const auto below = [&](std::size_t n) { return static_cast<std::size_t>(random()) % n; };
+  int refused = 0, played = 0;
+  for (int round = 0; round < 600; ++round) {
+    const ToolModel& model = builtin_presets()[below(builtin_presets().size())];
+    std::string text = to_yaml(model);
+    for (std::size_t change = 0; change <= below(3); ++change) {
+      const std::size_t at = below(text.size());
+      switch (below(4)) {
+        case 0:
+          text[at] = static_cast<char>(random());
+          break;
+        case 1:
+          text.erase(at, 1 + below(20));
+          break;
+        case 2:
+          text.insert(at, std::string("0123456789-.e{}[]:&*!")[below(21)] + std::string());
+          break;
+        default:
+          text.insert(at, text.substr(below(text.size()), below(40)));
+      }
+      if (text.empty()) text = "x";
+    }
+    const auto damaged = parse_preset(text, "a.yaml");
+    if (!damaged) {
+      ++refused;
+      EXPECT_EQ(damaged.error().message.find('\n'), std::string::npos) << damaged.error().message;
+      continue;
+    }
+    ++played;
+    ToolSound tool;
+    tool.tool = "drill-3.2";
+    tool.rpm = 1000;
+    tool.load = tool.hardness = tool.chips = 1;
+    tool.torque_Nmm = 20;
+    tool.cortex_mm = 2;
+    Handpiece piece = make_handpiece(*damaged, nullptr, 48000);
+    Voice voice;
+    voice.start(piece, {}, 48000, tool, 1);
+    tool.blows = 1;
+    tool.blow_impulse_N_s = 3;
+    for (int i = 0; i < 8; ++i) {
+      voice.aim(tool);
+      Block block{};
+      voice.add_to(block);
+      ASSERT_TRUE(std::ranges::all_of(block, [](float x) { return std::isfinite(x); })) << text;
+    }
+  }
+  std::printf("  %d refused, %d played\n", refused, played);
+  EXPECT_GT(refused, 100);
+  EXPECT_GT(played, 50);
 }
 
 std::vector<float> play_tool(const ToolModel& model, const ToolSound& tool, double seconds) {
