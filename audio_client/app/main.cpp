@@ -1,4 +1,5 @@
-// osteon-audio: joins a room and plays the sound of its tools, or analyses or models a recording.
+// osteon-audio: joins a room and plays the sound of its tools. Or it analyses or models a recording, or makes a preset
+// of it.
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
@@ -16,11 +17,13 @@
 #include <system_error>
 #include <thread>
 #include <utility>
+#include <vector>
 
 #include "audio_client/app/analyse_command.hpp"
 #include "audio_client/app/devices_command.hpp"
 #include "audio_client/app/listening_option.hpp"
 #include "audio_client/app/model_command.hpp"
+#include "audio_client/app/preset_command.hpp"
 #include "audio_client/net/state_subscription.hpp"
 #include "audio_client/output/audio_output.hpp"
 #include "audio_client/output/reconnecting_output.hpp"
@@ -55,6 +58,7 @@ struct Options {
   std::string output = "pulse", device;
   audio::ListeningOption listening;
   std::filesystem::path wav_file, state_log_file, summary_file, window;
+  std::vector<std::string> presets;
   double patience_s = 5;
 };
 
@@ -204,9 +208,12 @@ Result<void> run(const Options& options, const StopSignal& stop) {
   if (Result<void> usable = check_writable(options.state_log_file, "the state log", "--state-log"); !usable)
     return usable;
   if (Result<void> usable = check_writable(options.wav_file, "the recording", "--wav"); !usable) return usable;
+  Result<std::vector<audio::ToolModel>> presets = audio::presets_of(options.presets);
+  if (!presets) return tl::unexpected(presets.error());
   std::optional<audio::WavRecorder> recorder;
   audio::SynthParams synth_params;
   synth_params.rate_hz = output_params.rate_hz;
+  synth_params.presets = std::move(*presets);
   Result<audio::Space> space = audio::read(options.listening, output_params.rate_hz);
   if (!space) return tl::unexpected(space.error());
   audio::SoundEngine engine(synth_params);
@@ -306,6 +313,7 @@ int main(int argc, char** argv) {
   audio::add_analyse_command(app, command);
   audio::add_model_commands(app, command);
   audio::add_devices_command(app, command);
+  audio::add_preset_command(app, command);
   app.require_subcommand(0, 1);
   app.add_option("--server", options.server, "HOST:PORT of osteon-server; needed to play");
   app.add_option("--room", options.room, "Name of the room; not needed where the server has one");
@@ -316,6 +324,9 @@ int main(int argc, char** argv) {
   app.add_option("--device", options.device,
                  "Name or number of a sink, as osteon-audio devices lists them; by default, the server's own choice");
   audio::add_listening(app, options.listening);
+  app.add_option("--preset", options.presets,
+                 "Preset of a tool's sound, or a folder of presets, which go before those of Osteon; may be repeated")
+      ->allow_extra_args(false);
   app.add_option("--wav", options.wav_file,
                  "Record the sound: 48 kHz, 16 bit, both channels, or one with --listen mono");
   app.add_option("--state-log", options.state_log_file,

@@ -1,17 +1,33 @@
 #include "audio_client/synth/drill_synth.hpp"
 
 #include <algorithm>
+#include <string_view>
 
+#include "audio_client/presets/preset_file.hpp"
 #include "common/core/check.hpp"
+#include "common/tools/tool.hpp"
+#include "common/tools/tool_file.hpp"
 
 namespace osteon::audio {
 
 void DrillSynth::prepare(const SynthParams& params) {
   OSTEON_CHECK(params.rate_hz > 0);
   params_ = params;
-  for (int kind = 0; kind < kHandpieceKinds; ++kind) {
-    handpieces_[static_cast<std::size_t>(kind)] = make_handpiece(static_cast<HandpieceKind>(kind));
-  }
+  std::vector<ToolModel> presets = params.presets;
+  presets.insert(presets.end(), builtin_presets().begin(), builtin_presets().end());
+  const auto made = [&](std::string_view name, std::string_view kind, const Tool* tool) {
+    const ToolModel* model = preset_for(presets, name, kind);
+    return make_handpiece(model ? *model : *preset_for(presets, "", "drill"), tool, params.rate_hz);
+  };
+  pieces_.clear();
+  for (const Tool& tool : builtin_tools())
+    if (preset_for(presets, tool.name, kind_name(tool.kind)))
+      pieces_.push_back({tool.name, made(tool.name, kind_name(tool.kind), &tool)});
+  std::ranges::sort(pieces_, {}, &Piece::tool);
+  const Result<Tool> drill = find_tool("drill-3.2"), burr = find_tool("burr-round-5");
+  OSTEON_CHECK(drill && burr);
+  unknown_ = {made("", "drill", &*drill), made("", "round-burr", &*burr)};
+  suction_.prepare(params.suction, *preset_for(presets, "suction", ""), params.rate_hz, params.seed);
   reset();
 }
 
@@ -19,7 +35,7 @@ void DrillSynth::reset() noexcept {
   voices_.fill(Voice{});
   for (SoundPath& path : paths_) path.prepare(params_.space, params_.rate_hz);
   suction_path_.prepare(params_.space, params_.rate_hz);
-  suction_.prepare(params_.suction, params_.rate_hz, params_.seed);
+  suction_.reset();
   limiter_.reset();
   block_ = StereoBlock{};
   used_ = kBlockFrames;
@@ -39,13 +55,21 @@ void DrillSynth::aim_suction(std::span<const ToolSound> tools) noexcept {
   suction_.aim(on);
 }
 
+const Handpiece& DrillSynth::handpiece_of(const ToolSound& tool) const noexcept {
+  const auto known =
+      std::ranges::lower_bound(pieces_, tool.tool, {}, [](const Piece& p) { return std::string_view(p.tool); });
+  return known != pieces_.end() && known->tool == tool.tool ? known->handpiece
+                                                            : unknown_[static_cast<std::size_t>(tool.handpiece)];
+}
+
 void DrillSynth::aim(const SoundScene& scene) noexcept {
   std::array<bool, kVoices> aimed{};
   aim_suction(std::span(scene.tools).first(static_cast<std::size_t>(scene.count)));
   for (int t = 0; t < scene.count; ++t) {
     const ToolSound& tool = scene.tools[static_cast<std::size_t>(t)];
+    const Handpiece& handpiece = handpiece_of(tool);
     const auto same = std::find_if(voices_.begin(), voices_.end(), [&](const Voice& v) {
-      return v.sounding() && v.author() == tool.author && v.kind() == tool.handpiece;
+      return (v.sounding() || v.waits()) && v.author() == tool.author && v.handpiece() == &handpiece;
     });
     if (same != voices_.end()) {
       same->aim(tool);
@@ -54,17 +78,17 @@ void DrillSynth::aim(const SoundScene& scene) noexcept {
       aimed[at] = true;
       continue;
     }
-    if (tool.rpm == 0) continue;  // at rest: no sound
+    // At rest there is no sound. But the voice of a tool that is struck must know how many blows there were.
+    if (tool.rpm == 0 && handpiece.model.drive != Drive::blows) continue;
     std::size_t free = 0;
     while (free < voices_.size() && !vacant(free)) ++free;
     if (free == voices_.size()) continue;
     paths_[free].start(tool.tip_mm);
-    voices_[free].start(handpieces_[static_cast<std::size_t>(tool.handpiece)], params_.voice, params_.rate_hz, tool,
-                        params_.seed + tool.author);
+    voices_[free].start(handpiece, params_.voice, params_.rate_hz, tool, params_.seed + tool.author);
     aimed[free] = true;
   }
   for (std::size_t v = 0; v < voices_.size(); ++v) {
-    if (voices_[v].sounding() && !aimed[v]) voices_[v].release();
+    if ((voices_[v].sounding() || voices_[v].waits()) && !aimed[v]) voices_[v].release();
   }
 }
 
@@ -93,7 +117,7 @@ void DrillSynth::process(std::span<float> mono) noexcept {
 void DrillSynth::render_block() noexcept {
   block_ = StereoBlock{};
   for (std::size_t v = 0; v < voices_.size(); ++v) {
-    if (vacant(v)) continue;
+    if (quiet(v)) continue;
     Block own{};
     if (voices_[v].sounding()) voices_[v].add_to(own);
     paths_[v].add_to(own, block_);

@@ -3,6 +3,8 @@
 #include <array>
 #include <cstdint>
 #include <span>
+#include <string>
+#include <vector>
 
 #include "audio_client/space/block.hpp"
 #include "audio_client/space/sound_path.hpp"
@@ -20,6 +22,7 @@ struct SynthParams {
   VoiceParams voice;
   SuctionParams suction;
   Space space;
+  std::vector<ToolModel> presets;  // the user's; they go before those that come with Osteon
 };
 
 class DrillSynth {
@@ -46,15 +49,24 @@ class DrillSynth {
   // When a tool is exchanged, the old one runs down while the new one sounds. So there are more voices than tools.
   static constexpr int kVoices = 2 * kMaxTools;
 
+  struct Piece {
+    std::string tool;
+    Handpiece handpiece;
+  };
+
   void render_block() noexcept;
   void aim_suction(std::span<const ToolSound> tools) noexcept;
-  // Where a source of its own may start: nothing sounds here, and nothing is under way.
-  [[nodiscard]] bool vacant(std::size_t voice) const noexcept {
+  [[nodiscard]] const Handpiece& handpiece_of(const ToolSound& tool) const noexcept;
+  // Nothing of this voice is on its way to the listener.
+  [[nodiscard]] bool quiet(std::size_t voice) const noexcept {
     return !voices_[voice].sounding() && !paths_[voice].ringing();
   }
+  // Where a source of its own may start.
+  [[nodiscard]] bool vacant(std::size_t voice) const noexcept { return quiet(voice) && !voices_[voice].waits(); }
 
   SynthParams params_;
-  std::array<Handpiece, kHandpieceKinds> handpieces_;
+  std::vector<Piece> pieces_;                       // of all known tools, by name; voices point into it
+  std::array<Handpiece, kHandpieceKinds> unknown_;  // of other tools
   std::array<Voice, kVoices> voices_;
   std::array<SoundPath, kVoices> paths_;  // of each voice to the listener
   SuctionSound suction_;                  // one for all suckers of the room, heard from the first of them

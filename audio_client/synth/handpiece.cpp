@@ -1,90 +1,87 @@
 #include "audio_client/synth/handpiece.hpp"
 
+#include <algorithm>
 #include <cmath>
 
+#include "audio_client/synth/resonances.hpp"
 #include "common/core/check.hpp"
-#include "common/sound/gearbox.hpp"
+#include "common/sound/resample.hpp"
+#include "common/tools/tool.hpp"
 
 namespace osteon::audio {
 namespace {
 
-// RMS of the free-running partials at rated speed, relative to full scale. -32 dB leaves room for the load and for
-// other tools.
-constexpr double kFreeLevel = 0.025;
-
-Handpiece geared_drill() {
-  constexpr sound::Gearbox gears;
-  Handpiece drill{.kind = HandpieceKind::geared_drill, .teeth = 2, .rated_rpm = 1400, .air_level = 1.4, .partials = {}};
-  auto& p = drill.partials;
-
-  // Unbalance of the three shafts.
-  p.push_back({1, Source::shaft, 0.10});
-  p.push_back({2, Source::shaft, 0.10});
-  p.push_back({gears.transfer(), Source::shaft, 0.12});
-  p.push_back({gears.motor(), Source::shaft, 0.20});
-  p.push_back({2 * gears.motor(), Source::shaft, 0.10});
-
-  // Commutation: the third harmonic is the loudest line of the free-running drill (8.5.4: 5500 Hz, magnetic pole pass).
-  const double commutation = sound::kCommutatorSegments * gears.motor();
-  const double commutation_levels[] = {0.30, 0.10, 1.00, 0.12};
-  for (int i = 0; i < 4; ++i) p.push_back({(i + 1) * commutation, Source::motor, commutation_levels[i]});
-  for (const int side : {-1, 1}) p.push_back({3 * commutation + side * gears.motor(), Source::motor, 0.18});
-
-  // Meshes with the sidebands n f_mesh +- k f_spin; low orders dominate (8.5.2).
-  const double output_levels[] = {0.45, 0.40, 0.25, 0.16, 0.06, 0.35};
-  for (int n = 0; n < 6; ++n) p.push_back({(n + 1) * gears.output_mesh(), Source::output_mesh, output_levels[n]});
-  for (const int side : {-2, -1, 1, 2}) {
-    p.push_back(
-        {gears.output_mesh() + side * gears.output_spin(), Source::output_mesh, side * side == 1 ? 0.14 : 0.06});
-  }
-  p.push_back({gears.motor_mesh(), Source::motor_mesh, 0.72});
-  p.push_back({2 * gears.motor_mesh(), Source::motor_mesh, 0.10});
-  for (const int side : {-2, -1, 1, 2}) {
-    p.push_back({gears.motor_mesh() + side * gears.motor_spin(), Source::motor_mesh, side * side == 1 ? 0.20 : 0.08});
-  }
-
-  // The flutes: they fill 0-400 Hz while cutting (8.5.4).
-  for (int k = 1; k <= 12; ++k) p.push_back({static_cast<double>(k * drill.teeth), Source::tooth, 1.0 / std::sqrt(k)});
-  return drill;
-}
-
-Handpiece direct_burr() {
-  Handpiece burr{.kind = HandpieceKind::direct_burr, .teeth = 8, .rated_rpm = 40000, .air_level = 1.0, .partials = {}};
-  auto& p = burr.partials;
-  const double shaft_levels[] = {1.00, 0.35, 0.20, 0.10};
-  for (int k = 0; k < 4; ++k) p.push_back({k + 1.0, Source::shaft, shaft_levels[k]});
-  // A brushless motor with one pole pair steps six times per turn.
-  p.push_back({6, Source::motor, 0.50});
-  p.push_back({12, Source::motor, 0.15});
-  // The bearings' cage turns a little slower than half of the shaft and beats with it.
-  p.push_back({0.4, Source::shaft, 0.08});
-  p.push_back({0.6, Source::shaft, 0.06});
-  p.push_back({1.4, Source::shaft, 0.08});
-  // Flutes with an unevenness once per turn: sidebands at the shaft's frequency.
-  for (int k = 1; k <= 4; ++k) p.push_back({static_cast<double>(k * burr.teeth), Source::tooth, 0.9 / k});
-  for (const int side : {-1, 1}) p.push_back({static_cast<double>(burr.teeth + side), Source::tooth, 0.30});
-  for (int k = 1; k <= 3; ++k) p.push_back({static_cast<double>(k), Source::tooth, 0.4});
-  return burr;
-}
+constexpr double kHardest_g_cm3 = 1.9;  // of ToolSound's hardness 1
+constexpr double kMostLoad = 1.5;       // of a material's own
 
 }  // namespace
+
+double amplitude_of_db(double db) noexcept { return std::pow(10.0, 0.05 * db); }
 
 double radiation(double hz) noexcept {
   const double low = hz * hz / (hz * hz + 200.0 * 200.0);
   return low / (1.0 + (hz / 7000.0) * (hz / 7000.0));
 }
 
-Handpiece make_handpiece(HandpieceKind kind) {
-  Handpiece piece = kind == HandpieceKind::geared_drill ? geared_drill() : direct_burr();
-  OSTEON_CHECK(piece.partials.size() <= kMaxPartials);
-  double mean_square = 0;
-  for (const Partial& p : piece.partials) {
-    const double radiated = p.level * radiation(p.ratio * piece.rated_rpm / 60.0);
-    if (p.source != Source::tooth) mean_square += 0.5 * radiated * radiated;
+SpindleParams at_spindle(const Motor& motor, double rated_rpm) {
+  const double torque_ratio = motor.reduction * motor.efficiency;
+  // J times the droop, with J in kg m^2 and the droop in rad/s per N m.
+  const double response_s = 1e-7 * motor.inertia_g_cm2 * motor.droop_rpm_per_Nmm * 1e3 * 0.10471975511965977;
+  return {.full_rpm = rated_rpm,
+          .run_up_s = motor.run_up_s,
+          .droop_rpm_per_nmm = motor.droop_rpm_per_Nmm / (motor.reduction * torque_ratio),
+          .most_nmm = motor.most_Nmm * torque_ratio,
+          .response_s = response_s};
+}
+
+Gains material_gains(const ToolModel& model, double load, double hardness, double perforated) noexcept {
+  const Material &soft = model.cancellous, &hard = model.cortical;
+  const double density = hardness * kHardest_g_cm3;
+  const double way = std::clamp((density - soft.density_g_cm3) / (hard.density_g_cm3 - soft.density_g_cm3), 0.0, 1.0);
+  const double softer = std::clamp(density / soft.density_g_cm3, 0.0, 1.0);  // than the softest of the table
+  const double part = softer * std::clamp(load / std::lerp(soft.load, hard.load, way), 0.0, kMostLoad);
+  Gains gains;
+  for (std::size_t s = 0; s < gains.source.size(); ++s) {
+    const bool teeth = static_cast<LineSource>(s) == LineSource::teeth;
+    const double full =
+        amplitude_of_db(std::lerp(applied_change(soft.change_db[s]), applied_change(hard.change_db[s]), way));
+    const double through = amplitude_of_db(applied_change(model.perforation.change_db[s]));
+    // Teeth sound only while they cut.
+    const double cut = teeth ? part * full : 1.0 + part * (full - 1.0);
+    gains.source[s] = std::max({0.0, cut, perforated * through});
   }
-  const double scale = kFreeLevel / std::sqrt(mean_square);
-  for (Partial& p : piece.partials) p.level *= scale;
-  piece.air_level *= kFreeLevel;
+  const double noise = amplitude_of_db(std::lerp(applied_change(soft.noise_db), applied_change(hard.noise_db), way));
+  gains.noise = std::max(0.0, 1.0 + part * (noise - 1.0));
+  return gains;
+}
+
+Handpiece make_handpiece(const ToolModel& model, const Tool* tool, double rate_hz) {
+  OSTEON_CHECK(model.lines.size() <= kMostLines && model.blow.modes.size() <= kMostModes &&
+               model.perforation.burst.size() <= kMostModes);
+  Handpiece piece;
+  piece.model = model;
+  piece.teeth = model.teeth > 0 ? model.teeth : tool && tool->teeth > 0 ? tool->teeth : 2;
+  for (const Line& line : model.lines) {
+    const double ratio = line.order + line.teeth * piece.teeth;
+    if (ratio <= 0) continue;  // a sideband below a tool's only tooth
+    piece.partials.push_back({.ratio = ratio,
+                              .source = line.source,
+                              .level = amplitude_of_db(line.level_db),
+                              .rated_gain = std::max(1e-6, radiation(ratio * model.rated_rpm / 60.0))});
+  }
+  piece.spindle = at_spindle(model.motor, model.rated_rpm);
+  piece.noise.prepare(model.noise, rate_hz);
+  const BladeParams& blade = model.blade;
+  double length_mm = blade.length_mm, thickness_mm = blade.thickness_mm;
+  if (tool && tool->thickness_mm > 0 && model.drive == Drive::strokes) {
+    length_mm = tool->reach_mm();
+    thickness_mm = tool->thickness_mm;
+  }
+  if (length_mm > 0 && thickness_mm > 0)
+    for (int m = 0; m < kBladeModes; ++m)
+      piece.blade_hz[static_cast<std::size_t>(m)] = beam_mode_hz(m, length_mm, thickness_mm);
+  for (const std::vector<float>& transient : model.transients)
+    piece.clicks.push_back(sound::resampled(transient, kPresetTransientRate_hz, static_cast<int>(rate_hz)));
   return piece;
 }
 

@@ -7,6 +7,8 @@
 
 namespace osteon::audio {
 
+inline constexpr double kWhiteVariance = 1.0 / 3.0;  // of numbers uniform over -1 to 1
+
 // xorshift64*: the same seed makes the same noise on every machine.
 class WhiteNoise {
  public:

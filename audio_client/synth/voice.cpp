@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <span>
+
+#include "audio_client/synth/resonances.hpp"
 
 namespace osteon::audio {
 namespace {
@@ -16,20 +19,61 @@ constexpr double kSilentRpm = 1.0;
 constexpr double kRecentLoad_s = 0.15;
 constexpr double kFlutter_s = 0.08;
 
-// Chips against the drill: a share of the level of the partials at full load.
-constexpr double kChipLevel = 0.045;
-
-// Perforation is a short burst around 200 Hz (8.5.4); the second mode gives it a body.
-struct KnockMode {
-  double hz, decay_s, level;
-};
-constexpr std::array<KnockMode, 2> kKnock = {{{190.0, 0.035, 0.22}, {430.0, 0.018, 0.09}}};
+// A layer gives way if less than this share of a load is left. Cancellous bone behind a cortex keeps more.
+constexpr double kGivesWay = 0.3;
 constexpr double kKnockLoad = 0.25;  // a smaller load gives way without a sound
+
+// Each tooth breaks its own chips. Below this frequency that is a rattle; above, a tone that the partials make.
+constexpr double kRattle_hz = 400.0;
+constexpr double kMostBlow = 3.0;  // of the reference blow
+constexpr double kLowestPlate_hz = 60.0;
 
 double share(double seconds, double rate_hz) { return 1.0 - std::exp(-kBlockFrames / (seconds * rate_hz)); }
 
 double audible(double hz, double rate_hz) {
   return std::clamp((kFadeEnd - hz / rate_hz) / (kFadeEnd - kFadeStart), 0.0, 1.0);
+}
+
+// The factor on white noise that gives a band with this RMS: a band-pass of two poles has the bandwidth pi f / (2 Q).
+double band_gain(double rms, double hz, double quality, double rate_hz) {
+  return rms / std::sqrt(kWhiteVariance * std::numbers::pi * hz / (quality * rate_hz));
+}
+
+// Strength at `hz` of a blow that lasts for `contact_s`, relative to one that lasts no time: the spectrum of half a
+// sine.
+double blow_strength(double hz, double contact_s) {
+  const double x = hz * contact_s, below = 1.0 - 4.0 * x * x;
+  return std::abs(below) < 1e-3 ? 0.25 * std::numbers::pi : std::abs(std::cos(std::numbers::pi * x) / below);
+}
+
+// Adds a sine from one phase and level on. Lanes of samples apart, so that the compiler takes several at once.
+void add_sine(Block& block, double phase_turns, double step_turns, float from, float to) {
+  constexpr std::size_t kLanes = 8;
+  std::array<float, kLanes> re{}, im{}, amplitude{};
+  const float step = (to - from) / kBlockFrames;
+  for (std::size_t l = 0; l < kLanes; ++l) {
+    amplitude[l] = from + static_cast<float>(l) * step;
+  }
+  auto c = static_cast<float>(std::cos(kTurn * step_turns)), s = static_cast<float>(std::sin(kTurn * step_turns));
+  re[0] = static_cast<float>(std::cos(kTurn * phase_turns));
+  im[0] = static_cast<float>(std::sin(kTurn * phase_turns));
+  for (std::size_t l = 1; l < kLanes; ++l) {
+    re[l] = re[l - 1] * c - im[l - 1] * s;
+    im[l] = re[l - 1] * s + im[l - 1] * c;
+  }
+  for (std::size_t doubled = 1; doubled < kLanes; doubled *= 2) {
+    const float square = c * c - s * s;
+    s = 2.0F * c * s;
+    c = square;
+  }
+  for (std::size_t at = 0; at < block.size(); at += kLanes)
+    for (std::size_t l = 0; l < kLanes; ++l) {
+      block[at + l] += amplitude[l] * im[l];
+      amplitude[l] += static_cast<float>(kLanes) * step;
+      const float next = re[l] * c - im[l] * s;
+      im[l] = re[l] * s + im[l] * c;
+      re[l] = next;
+    }
 }
 
 }  // namespace
@@ -40,77 +84,108 @@ void Voice::start(const Handpiece& handpiece, const VoiceParams& params, double 
   handpiece_ = &handpiece;
   params_ = params;
   rate_hz_ = rate_hz;
-  sounding_ = true;
   noise_ = WhiteNoise(seed);
   // Random phases keep the crest factor low.
-  for (std::size_t i = 0; i < kMaxPartials; ++i) phase_[i] = 0.5 + 0.5 * noise_.next();
+  for (double& offset : offset_) offset = 0.5 + 0.5 * noise_.next();
+  air_ = handpiece.noise;
+  motor_.start(handpiece.spindle, handpiece.model.motor.run_down_s);
+  for (std::size_t m = 0; m < blade_filters_.size(); ++m)
+    if (const double hz = handpiece.blade_hz[m]; hz > 0 && hz < kFadeStart * rate_hz) {
+      const BladeParams& blade = handpiece.model.blade;
+      blade_filters_[m].set(hz, rate_hz, blade.quality);
+      // The first modes are too low to be radiated well.
+      const double rms = amplitude_of_db(blade.slope_db * static_cast<double>(m)) * radiation(hz);
+      blade_levels_[m] = static_cast<float>(band_gain(rms, hz, blade.quality, rate_hz));
+    }
   target_.author = tool.author;
   target_.handpiece = tool.handpiece;
+  blows_ = tool.blows;
+  waits_ = handpiece.model.drive == Drive::blows;
   aim(tool);
 }
 
 void Voice::aim(const ToolSound& tool) noexcept {
-  // A layer gives way: the load is gone from a tool that advances, or that advanced one state ago and is through. A
-  // tool that is drawn back stops first and leaves without a knock.
-  if ((tool.advancing || target_.advancing) && recent_load_ > kKnockLoad && tool.load < 0.5 * recent_load_) {
-    const auto released = static_cast<float>(recent_load_ - tool.load);
-    // Adding to the real part leaves the sounding imaginary part continuous.
-    for (std::size_t m = 0; m < kKnock.size(); ++m) knock_re_[m] += released * static_cast<float>(kKnock[m].level);
-    recent_load_ = tool.load;
+  if (handpiece_->model.drive == Drive::blows) {
+    if (tool.blows > blows_) blow(tool);
+    blows_ = tool.blows;
+    target_ = tool;
+    target_.rpm = 0;  // blows in a minute are no speed
+    return;
   }
+  break_through(tool);
   target_ = tool;
-  span_rpm_ = std::max(span_rpm_, tool.rpm);
+  motor_.aim(tool.rpm, tool.torque_Nmm);
+  if (tool.rpm > 0) sounding_ = true;
+}
+
+void Voice::release() noexcept {
+  target_.rpm = target_.load = target_.hardness = target_.chips = 0;
+  motor_.aim(0, 0);
+  waits_ = false;
+}
+
+// A layer gives way: the load is gone from a tool that advances, or that advanced one state ago and is through. A tool
+// that is drawn back stops first and leaves without a knock.
+void Voice::break_through(const ToolSound& tool) noexcept {
+  if (!(tool.advancing || target_.advancing) || recent_load_ <= kKnockLoad || tool.load >= kGivesWay * recent_load_)
+    return;
+  const double released = recent_load_ - tool.load;
+  const std::vector<Mode>& burst = handpiece_->model.perforation.burst;
+  for (std::size_t m = 0; m < burst.size(); ++m)
+    burst_.strike(m, burst[m].hz, burst[m].decay_s, released * amplitude_of_db(burst[m].level_db), rate_hz_);
+  perforated_ = std::clamp(released, perforated_, 1.0);
+  recent_load_ = tool.load;
+}
+
+void Voice::blow(const ToolSound& tool) noexcept {
+  const BlowParams& params = handpiece_->model.blow;
+  const double strength = std::clamp(tool.blow_impulse_N_s / params.impulse_N_s, 0.0, kMostBlow);
+  // A contact whose stiffness grows in proportion to the seating: frequencies go with its root.
+  const double stiffer = (1.0 + params.rise) * (1.0 + params.rise) - 1.0;
+  const double rise = std::sqrt(1.0 + stiffer * std::clamp(tool.seated, 0.0, 1.0));
+  for (std::size_t m = 0; m < params.modes.size(); ++m) {
+    const Mode& mode = params.modes[m];
+    const double hz = rise * mode.hz;
+    modes_.strike(m, hz, mode.decay_s, strength * amplitude_of_db(mode.level_db) * blow_strength(hz, params.contact_s),
+                  rate_hz_);
+  }
+  click_level_ = static_cast<float>(strength * amplitude_of_db(params.click_db));
+  if (!handpiece_->clicks.empty()) click_ = (click_ + 1) % handpiece_->clicks.size();
+  click_at_ = 0;
+  sounding_ = true;
 }
 
 void Voice::add_to(Block& block) noexcept {
   advance_controls();
   add_partials(block);
-  add_noise(block);
-  add_knock(block);
-  if (rpm_ == 0 && target_.rpm == 0 && std::abs(knock_im_[0]) + std::abs(knock_re_[0]) < 1e-5F) sounding_ = false;
+  add_cut(block);
+  burst_.add_to(block);
+  modes_.add_to(block);
+  add_click(block);
+  const bool driven = rpm_ > 0 || target_.rpm > 0 || motor_.stalled();
+  sounding_ = driven || burst_.ringing() || modes_.ringing() || click_level_ > 0;
 }
 
 void Voice::advance_controls() noexcept {
-  const double block_s = kBlockFrames / rate_hz_;
-  const double up = span_rpm_ * block_s / params_.run_up_s, down = span_rpm_ * block_s / params_.run_down_s;
-  slewed_rpm_ = std::clamp(target_.rpm, slewed_rpm_ - down, slewed_rpm_ + up);
+  motor_.step(kBlockFrames / rate_hz_);
   const double k = share(params_.smoothing_s, rate_hz_);
-  rpm_ += k * (slewed_rpm_ - rpm_);
-  if (slewed_rpm_ == 0 && rpm_ < kSilentRpm) rpm_ = 0;
+  rpm_ += k * (motor_.rpm() - rpm_);
+  if (motor_.rpm() < kSilentRpm && rpm_ < kSilentRpm) rpm_ = 0;
   load_ += k * (target_.load - load_);
   hardness_ += k * (target_.hardness - hardness_);
   chips_ += k * (target_.chips - chips_);
+  if (target_.cortex_mm > 0)
+    cortex_mm_ = cortex_mm_ > 0 ? cortex_mm_ + k * (target_.cortex_mm - cortex_mm_) : target_.cortex_mm;
   recent_load_ = std::max(target_.load, recent_load_ * (1.0 - share(kRecentLoad_s, rate_hz_)));
-
-  // The same thrust is louder in hard bone, which breaks, than in soft bone, which yields.
-  drive_ = load_ * (0.25 + 0.75 * hardness_);
-  tone_drive_ = std::sqrt(std::max(0.0, drive_));
-}
-
-// 8.5.4: both gears and motor grow with the load. As the load falls, the motor falls faster. So free and cortical are
-// dominated by the motor's line, and cancellous by the gears'.
-double Voice::source_gain(Source source) const noexcept {
-  switch (source) {
-    case Source::shaft:
-      return 1.0 + 2.0 * drive_;
-    case Source::motor:
-      return 1.0 + 4.5 * drive_;
-    case Source::motor_mesh:
-      return 1.0 + 4.0 * tone_drive_;
-    case Source::output_mesh:
-      return 1.0 + 3.5 * tone_drive_;
-    case Source::tooth:
-      return 4.0 * std::pow(drive_, 0.8);
-  }
-  return 0.0;
+  perforated_ *= 1.0 - share(handpiece_->model.perforation.fade_s, rate_hz_);
+  gains_ = material_gains(handpiece_->model, load_, hardness_, perforated_);
 }
 
 void Voice::add_partials(Block& block) noexcept {
-  std::array<double, 5> gains;
-  for (std::size_t s = 0; s < gains.size(); ++s) gains[s] = source_gain(static_cast<Source>(s));
-  const double speed = rpm_ / handpiece_->rated_rpm;
-  const double tilt = 0.4 * hardness_;  // hard bone is bright: the high partials become louder relative to the low ones
+  const double speed = rpm_ / handpiece_->model.rated_rpm;
   const double spindle_hz = rpm_ / 60.0;
+  const double from_turns = turns_;
+  turns_ += spindle_hz * kBlockFrames / rate_hz_;
   const auto flutter_share = static_cast<float>(share(kFlutter_s, rate_hz_));
   // A one-pole filter leaves share / (2 - share) of the variance, 1/3, of the noise it smooths.
   const auto flutter_scale =
@@ -123,77 +198,95 @@ void Voice::add_partials(Block& block) noexcept {
     const double hz = partial.ratio * spindle_hz;
     double level = 0;
     if (const double audibility = audible(hz, rate_hz_); audibility > 0 && hz > 0) {
-      level = partial.level * gains[static_cast<std::size_t>(partial.source)] * speed * radiation(hz) * audibility *
-              std::pow(std::max(hz, 100.0) / 2000.0, tilt) * (1.0 + flutter_scale * flutter_[i]);
+      level = partial.level * gains_.source[static_cast<std::size_t>(partial.source)] * speed * radiation(hz) /
+              partial.rated_gain * audibility * (1.0 + flutter_scale * flutter_[i]);
     }
     const float from = level_[i], to = static_cast<float>(level);
     level_[i] = to;
-    const double turns = hz / rate_hz_;
-    const double phase = phase_[i];
-    phase_[i] = std::fmod(phase + kBlockFrames * turns, 1.0);
     if (from == 0.0F && to == 0.0F) continue;
-
-    const auto c = static_cast<float>(std::cos(kTurn * turns)), s = static_cast<float>(std::sin(kTurn * turns));
-    auto re = static_cast<float>(std::cos(kTurn * phase)), im = static_cast<float>(std::sin(kTurn * phase));
-    const float step = (to - from) / kBlockFrames;
-    float amplitude = from;
-    for (float& x : block) {
-      x += amplitude * im;
-      amplitude += step;
-      const float next = re * c - im * s;
-      im = re * s + im * c;
-      re = next;
-    }
+    const double phase = partial.ratio * from_turns + offset_[i];
+    add_sine(block, phase - std::floor(phase), hz / rate_hz_, from, to);
   }
 }
 
-void Voice::add_noise(Block& block) noexcept {
-  const double speed = rpm_ / handpiece_->rated_rpm;
-  const auto chip_to = static_cast<float>(params_.noise * kChipLevel * chips_ * std::min(1.0, std::sqrt(speed)));
-  const auto air_to = static_cast<float>(params_.noise * handpiece_->air_level * speed * (1.0 + 2.0 * drive_));
-  if (chip_level_ == 0 && air_level_ == 0 && chip_to == 0 && air_to == 0) return;
-
+// Levels and filters of the cut's noise for this block.
+void Voice::tune_cut() noexcept {
+  const ToolModel& model = handpiece_->model;
+  const double flow = params_.noise * chips_ * std::min(1.0, std::sqrt(rpm_ / model.rated_rpm));
   // The chips of hard bone are smaller and stiffer, so their noise has a higher frequency.
-  chip_filter_.set(900.0 + 3600.0 * hardness_, rate_hz_, 0.9);
-  air_filter_.set(3500.0, rate_hz_, 0.45);
-  const double tooth_turns = rpm_ / 60.0 * handpiece_->teeth / rate_hz_;
-  const float chip_step = (chip_to - chip_level_) / kBlockFrames, air_step = (air_to - air_level_) / kBlockFrames;
-  // Each tooth breaks its own chips. Below 400 Hz this is a rattle; above, a tone that the partials make.
-  const double rattle_hz = tooth_turns * rate_hz_;
-  const auto depth = static_cast<float>(0.6 * std::clamp(2.0 - rattle_hz / 400.0, 0.0, 1.0));
-  auto re = static_cast<float>(std::cos(kTurn * tooth_phase_)), im = static_cast<float>(std::sin(kTurn * tooth_phase_));
-  const auto c = static_cast<float>(std::cos(kTurn * tooth_turns)),
-             s = static_cast<float>(std::sin(kTurn * tooth_turns));
+  const double hz = std::lerp(model.chips.soft_hz, model.chips.hard_hz, std::min(1.0, hardness_));
+  chip_filter_.set(hz, rate_hz_, model.chips.quality);
+  chip_to_ =
+      static_cast<float>(band_gain(flow * amplitude_of_db(model.chips.level_db), hz, model.chips.quality, rate_hz_));
+  plate_to_ = 0;
+  if (cortex_mm_ > 0 && target_.cortex_mm > 0) {
+    const double plate_hz =
+        std::clamp(plate_mode_hz(cortex_mm_, model.plate.radius_mm), kLowestPlate_hz, kFadeStart * rate_hz_);
+    plate_filter_.set(plate_hz, rate_hz_, model.plate.quality);
+    const double rms = flow * amplitude_of_db(model.plate.level_db);
+    plate_to_ = static_cast<float>(band_gain(rms, plate_hz, model.plate.quality, rate_hz_));
+  }
+  blade_to_ = static_cast<float>(flow * amplitude_of_db(model.blade.level_db));
+}
+
+void Voice::add_cut(Block& block) noexcept {
+  const ToolModel& model = handpiece_->model;
+  const double speed = rpm_ / model.rated_rpm;
+  const auto air_to = static_cast<float>(params_.noise * speed * gains_.noise);
+  if (air_level_ > 0 || air_to > 0) air_.add_to(block, noise_, air_level_, air_to);
+  air_level_ = air_to;
+  tune_cut();
+  if (chip_level_ + chip_to_ + plate_level_ + plate_to_ + blade_level_ + blade_to_ == 0) return;
+
+  const bool strokes = model.drive == Drive::strokes;
+  const double turns = rpm_ / 60.0 / rate_hz_ * (strokes ? 1.0 : handpiece_->teeth);
+  const double rattles = strokes ? 1.0 : std::clamp(2.0 - turns * rate_hz_ / kRattle_hz, 0.0, 1.0);
+  const auto depth = static_cast<float>(model.chips.depth * rattles),
+             lopsided = static_cast<float>(model.chips.lopsided);
+  const double end = turns_ * (strokes ? 1.0 : handpiece_->teeth) - kBlockFrames * turns, phase = end - std::floor(end);
+  auto re = static_cast<float>(std::cos(kTurn * phase)), im = static_cast<float>(std::sin(kTurn * phase));
+  const auto c = static_cast<float>(std::cos(kTurn * turns)), s = static_cast<float>(std::sin(kTurn * turns));
+  const float chip_step = (chip_to_ - chip_level_) / kBlockFrames,
+              plate_step = (plate_to_ - plate_level_) / kBlockFrames,
+              blade_step = (blade_to_ - blade_level_) / kBlockFrames;
   for (float& x : block) {
-    x += chip_level_ * (1.0F + depth * im) * chip_filter_.next(noise_.next());
-    x += air_level_ * air_filter_.next(noise_.next());
+    const float white = noise_.next();
+    // Teeth that swing are fastest in the middle of a stroke. Teeth that turn cut one after the other.
+    const float swing = strokes ? (1.0F - depth + depth * std::abs(re)) * (1.0F + lopsided * re) : 1.0F + depth * im;
+    float sum = chip_level_ * chip_filter_.next(white) + plate_level_ * plate_filter_.next(white);
+    if (strokes)
+      for (std::size_t m = 0; m < blade_filters_.size(); ++m)
+        sum += blade_level_ * blade_levels_[m] * blade_filters_[m].next(white);
+    x += swing * sum;
     chip_level_ += chip_step;
-    air_level_ += air_step;
+    plate_level_ += plate_step;
+    blade_level_ += blade_step;
     const float next = re * c - im * s;
     im = re * s + im * c;
     re = next;
   }
-  chip_level_ = chip_to;
-  air_level_ = air_to;
-  tooth_phase_ = std::fmod(tooth_phase_ + kBlockFrames * tooth_turns, 1.0);
+  chip_level_ = chip_to_;
+  plate_level_ = plate_to_;
+  blade_level_ = blade_to_;
 }
 
-void Voice::add_knock(Block& block) noexcept {
-  for (std::size_t m = 0; m < kKnock.size(); ++m) {
-    float re = knock_re_[m], im = knock_im_[m];
-    if (std::abs(re) + std::abs(im) < 1e-6F) continue;
-    const double decay = std::exp(-1.0 / (kKnock[m].decay_s * rate_hz_));
-    const double turn = kTurn * kKnock[m].hz / rate_hz_;
-    const auto c = static_cast<float>(decay * std::cos(turn)), s = static_cast<float>(decay * std::sin(turn));
-    for (float& x : block) {
-      x += im;
-      const float next = re * c - im * s;
-      im = re * s + im * c;
-      re = next;
-    }
-    knock_re_[m] = re;
-    knock_im_[m] = im;
+void Voice::add_click(Block& block) noexcept {
+  if (click_level_ == 0) return;
+  if (!handpiece_->clicks.empty()) {
+    const std::span<const float> click = handpiece_->clicks[click_];
+    const std::size_t count = std::min(block.size(), click.size() - click_at_);
+    for (std::size_t i = 0; i < count; ++i) block[i] += click_level_ * click[click_at_ + i];
+    click_at_ += count;
+    if (click_at_ == click.size()) click_level_ = 0;
+    return;
   }
+  const auto shrink = static_cast<float>(std::exp(-1.0 / (handpiece_->model.blow.click_s * rate_hz_)));
+  const auto noise = static_cast<float>(params_.noise);
+  for (float& x : block) {
+    x += noise * click_level_ * noise_.next();
+    click_level_ *= shrink;
+  }
+  if (click_level_ < 1e-5F) click_level_ = 0;
 }
 
 }  // namespace osteon::audio

@@ -78,6 +78,8 @@ class Help(unittest.TestCase):
         self.assertIn("--displacement", completed("osteon-audio", "analyse", "--di"))
         self.assertIn("--refine", completed("osteon-audio", "model", "--re"))
         self.assertIn("resynthesise", completed("osteon-audio", "re"))
+        self.assertIn("preset", completed("osteon-audio", "pr"))
+        self.assertIn("--preset", completed("osteon-audio", "--pr"))
         self.assertIn("--timeout", completed("osteon-viewer", "--ti"))
         self.assertIn("--language", completed("osteon", "--la"))
         self.assertEqual(completed("osteon-viewer", "--nothing-like-it"), [])

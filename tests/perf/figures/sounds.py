@@ -1,4 +1,5 @@
 """Figures of recorded sound, by the program osteon-audio."""
+import json
 import re
 import wave
 
@@ -76,4 +77,13 @@ def binaural(run):
             for name, values in speeds.items()}
 
 
-GROUPS = {"sound_analysis": analysis, "sound_binaural": binaural, "sound_model": models}
+def tools(run):
+    """What 8.5.4 says of drilling, on the synthesised sound."""
+    run.say("sound of the tools")
+    runs = [json.loads(run.output("osteon-tool-sounds")) for _ in range(3)]
+    speeds = [numbers.pop("speed") for numbers in runs]
+    values = {f"tool_sound_{name}": Measured(number) for name, number in runs[0].items()}
+    return values | {"tool_sound_speed": Measured(float(np.median(speeds)), None, min(speeds), max(speeds), 1)}
+
+
+GROUPS = {"sound_analysis": analysis, "sound_binaural": binaural, "sound_model": models, "tool_sound": tools}

@@ -8,12 +8,14 @@
 #include <numeric>
 #include <vector>
 
+#include "audio_client/presets/preset_file.hpp"
 #include "audio_client/synth/drill_synth.hpp"
 #include "audio_client/synth/limiter.hpp"
 #include "common/sound/gearbox.hpp"
 #include "common/sound/levels.hpp"
 #include "common/sound/spectrum.hpp"
 #include "common/sound/tones.hpp"
+#include "common/tools/tool.hpp"
 #include "tests/support/allocation_counter.hpp"
 #include "tests/unit/audio_client/scripted_drilling.hpp"
 
@@ -169,10 +171,11 @@ TEST(BurrSound, PartialsFollowTheSpindleAndGrowWithDensity) {
 TEST(BurrSound, HighestSpeedsDoNotFoldBack) {
   // Every line must lie on a partial. The folded 24 kHz and 32 kHz of a 60 000 rpm burr would be at 24 and 16 kHz,
   // those of 57 000 rpm at 17.6 kHz.
+  const Tool tool = *find_tool("burr-round-5");
   for (const double rpm : {57000.0, 60000.0, 90000.0}) {
     const std::vector<float> samples = steady(burr(rpm, 1.9), kPure);
     const sound::Spectrum spectrum = sound::power_spectrum(samples, kRate_hz, 16384);
-    const Handpiece piece = make_handpiece(HandpieceKind::direct_burr);
+    const Handpiece piece = make_handpiece(*preset_for(builtin_presets(), "", "round-burr"), &tool, kRate_hz);
     double strange = 0, all = 0;
     for (std::size_t k = 0; k < spectrum.power.size(); ++k) {
       const double hz = static_cast<double>(k) * spectrum.bin_hz;
