@@ -137,7 +137,7 @@ void DrillSynth::render_block() noexcept {
 bool DrillSynth::silent() const noexcept {
   if (tail_blocks_ != 0 || suction_.sounding() || suction_path_.ringing()) return false;
   for (std::size_t v = 0; v < voices_.size(); ++v)
-    if (!vacant(v)) return false;
+    if (!quiet(v)) return false;
   return true;
 }
 
