@@ -40,7 +40,6 @@ class LogStates final : public StateRecord {
   explicit LogStates(const std::filesystem::path& file) : file_(file.string()), in_(file, std::ios::binary) {
     std::error_code ignored;
     bytes_ = static_cast<double>(std::filesystem::file_size(file, ignored));
-    line_.reserve(kLongestLine);
   }
 
   Result<void> open() {
@@ -99,15 +98,14 @@ class LogStates final : public StateRecord {
 
   // False at the end. A last line without its end was cut off when its program was killed, and does not count.
   Result<bool> take_line() {
-    line_.resize(kLongestLine);
-    in_.getline(line_.data(), static_cast<std::streamsize>(kLongestLine));
+    in_.getline(buffer_.data(), static_cast<std::streamsize>(buffer_.size()));
     const auto got = static_cast<std::size_t>(in_.gcount());
     read_ += got;
     if (in_.eof()) return false;
     if (!in_)
       return bad_input(file_ + ": line " + std::to_string(number_ + 1) + " has more than " +
                        std::to_string(kLongestLine) + " bytes; give a log that osteon-haptic --session-log wrote");
-    line_.resize(got - 1);
+    line_ = std::string_view(buffer_.data(), got - 1);
     ++number_;
     return true;
   }
@@ -163,7 +161,9 @@ class LogStates final : public StateRecord {
   std::ifstream in_;
   double bytes_ = 0;
   std::uint64_t read_ = 0, number_ = 0, rows_ = 0;
-  std::string header_, line_;
+  std::vector<char> buffer_ = std::vector<char>(kLongestLine);
+  std::string header_;
+  std::string_view line_;  // in the buffer
   std::vector<std::string_view> columns_, fields_;
   std::array<Column, 8> needed_ = {{{"mono_ns"},
                                     {"phase"},

@@ -17,6 +17,7 @@ constexpr double kState_s = 1.0 / 120.0;
 constexpr double kAfterBreak_s = 0.12;  // in which a drill and its hand swing back
 constexpr double kContact = 0.1;        // share of the point
 constexpr double kBreaks = 0.5;
+constexpr double kTouch_mm = 0.01;  // of the tip in bone: deep enough to have an area
 constexpr double kApproach_mm = 2.0, kApproach_mm_per_s = 4.0, kBeyond_mm = 5.0;
 
 // Shares of the point's projected area.
@@ -82,7 +83,7 @@ class Hand {
   }
 
   CuttingState approach() {
-    if (tip_mm_ <= 0) tip_mm_ += kApproach_mm_per_s * kTick_s;
+    if (tip_mm_ < kTouch_mm) tip_mm_ += kApproach_mm_per_s * kTick_s;
     return {};
   }
   // Beyond the bone the hand stops the drill evenly.

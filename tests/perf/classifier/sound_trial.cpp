@@ -6,6 +6,7 @@
 
 #include "audio_client/offline/offline_sound.hpp"
 #include "common/core/check.hpp"
+#include "common/tools/tool.hpp"
 #include "tests/perf/classifier/gaussian_hmm.hpp"
 
 namespace osteon::test {
