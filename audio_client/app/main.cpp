@@ -1,5 +1,5 @@
-// osteon-audio: joins a room and plays the sound of its tools. Or it analyses or models a recording, or makes a preset
-// of it.
+// osteon-audio: joins a room and plays the sound of its tools, makes that of a recorded session, or records, analyses
+// or models a sound, or makes a preset of it.
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
@@ -24,6 +24,8 @@
 #include "audio_client/app/listening_option.hpp"
 #include "audio_client/app/model_command.hpp"
 #include "audio_client/app/preset_command.hpp"
+#include "audio_client/app/record_command.hpp"
+#include "audio_client/app/render_command.hpp"
 #include "audio_client/net/state_subscription.hpp"
 #include "audio_client/output/audio_output.hpp"
 #include "audio_client/output/reconnecting_output.hpp"
@@ -314,6 +316,8 @@ int main(int argc, char** argv) {
   audio::add_model_commands(app, command);
   audio::add_devices_command(app, command);
   audio::add_preset_command(app, command);
+  audio::add_render_command(app, command);
+  audio::add_record_command(app, command);
   app.require_subcommand(0, 1);
   app.add_option("--server", options.server, "HOST:PORT of osteon-server; needed to play");
   app.add_option("--room", options.room, "Name of the room; not needed where the server has one");

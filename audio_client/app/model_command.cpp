@@ -3,13 +3,13 @@
 #include <CLI/CLI.hpp>
 
 #include <cstdint>
-#include <filesystem>
 #include <memory>
 #include <string>
 #include <vector>
 
 #include "audio_client/analysis/analysis.hpp"
 #include "audio_client/analysis/model_report.hpp"
+#include "audio_client/app/output_file.hpp"
 #include "audio_client/app/recording_option.hpp"
 #include "common/runtime/files.hpp"
 
@@ -22,21 +22,6 @@ struct ModelArguments {
   int refinements = 2;
   std::uint64_t seed = 1;
 };
-
-// A file for an output, which is no other file of the same command.
-Result<void> check_output(const std::string& file, const std::string& what, const std::string& option,
-                          const std::vector<std::string>& others) {
-  if (file.empty()) return {};
-  std::error_code ignored;
-  if (std::filesystem::is_other(file, ignored))
-    return bad_input("cannot write " + what + " " + file + ": it is a device or a pipe; give " + option + " a file");
-  for (const std::string& other : others)
-    if (!other.empty() &&
-        std::filesystem::weakly_canonical(file, ignored) == std::filesystem::weakly_canonical(other, ignored))
-      return bad_input(file + " would lose " + (other == others.front() ? "what is read" : "the model") + "; give " +
-                       option + " another file");
-  return check_writable(file, what, option);
-}
 
 Result<std::string> run_model(const ModelArguments& a) {
   // What would be found after the work is found before it.

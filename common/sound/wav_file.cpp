@@ -1,7 +1,6 @@
 #include "common/sound/wav_file.hpp"
 
 #include <sndfile.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <array>
@@ -16,6 +15,7 @@
 #include <utility>
 
 #include "common/core/read_number.hpp"
+#include "common/sound/wav_writer.hpp"
 
 namespace osteon::sound {
 namespace {
@@ -294,34 +294,10 @@ Result<WavSound> read_wav(const fs::path& file, const WavPart& part) {
 }
 
 Result<void> write_wav(const fs::path& file, std::span<const float> samples, int rate_hz) {
-  std::error_code error;
-  // A rename would replace a link, a device or a pipe by a file.
-  const fs::path target = fs::is_symlink(file, error) ? fs::weakly_canonical(file, error) : file;
-  if (fs::is_other(target, error))
-    return failure(ErrorCode::internal,
-                   "cannot write the sound " + file.string() + ": it is a device or a pipe; give a file");
-  fs::path partial = target;
-  partial += ".partial-" + std::to_string(::getpid());
-  SF_INFO info{};
-  info.samplerate = rate_hz;
-  info.channels = 1;
-  info.format = SF_FORMAT_WAV | SF_FORMAT_PCM_16;
-  SoundFile out(sf_open(partial.c_str(), SFM_WRITE, &info));
-  if (!out)
-    return failure(ErrorCode::internal, "cannot write the sound " + file.string() + ": " + sf_strerror(nullptr) +
-                                            "; choose a place where you may write");
-  sf_command(out.get(), SFC_SET_CLIPPING, nullptr, SF_TRUE);
-  const auto count = static_cast<sf_count_t>(samples.size());
-  const bool whole = sf_writef_float(out.get(), samples.data(), count) == count;
-  if (sf_close(out.release()) == 0 && whole)
-    fs::rename(partial, target, error);
-  else
-    error = std::make_error_code(std::errc::no_space_on_device);
-  if (!error) return {};
-  std::error_code ignored;
-  fs::remove(partial, ignored);
-  return failure(ErrorCode::internal, "the sound " + file.string() + " could not be written whole (" + error.message() +
-                                          "); an older file of that name is as it was");
+  auto writer = WavWriter::open(file, {.rate_hz = rate_hz});
+  if (!writer) return tl::unexpected(writer.error());
+  if (auto written = writer->write(samples); !written) return written;
+  return writer->close();
 }
 
 }  // namespace osteon::sound

@@ -39,7 +39,7 @@ class Client {
         receiver_(session.plan().tools, replica_.queue(), exchange_, end_) {}
 
   Result<ClientOutcome> run() {
-    if (Result<void> opened = log_.open(options_.session_log, session_.device().info()); !opened)
+    if (Result<void> opened = log_.open(options_.session_log, session_.device().info(), room_.room().author); !opened)
       return tl::unexpected(opened.error());
     if (Result<void> opened = recorder_.open(options_.record, recording_info()); !opened)
       return tl::unexpected(opened.error());

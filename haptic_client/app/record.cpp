@@ -66,16 +66,17 @@ std::string RangeWatch::note(const ToolModel& model, const LoopReport& report) {
   return out_of_range_sentence(*law, report.cutting.out_of_range);
 }
 
-Result<void> SessionLog::open(const std::filesystem::path& file, const DeviceInfo& device) {
+Result<void> SessionLog::open(const std::filesystem::path& file, const DeviceInfo& device, AuthorId author) {
   path_ = file;
+  author_ = author;
   shows_force_ = device.force_axes > 0;
   if (file.empty()) return {};
   file_.open(file, std::ios::trunc);
   if (!file_)
     return failure(ErrorCode::internal, "the session log " + file.string() + " cannot be written; choose another path");
   file_ << "time_s,mono_ns,state_seq,phase,tool,tip_x_mm,tip_y_mm,tip_z_mm,depth_mm,device_depth_mm,force_physical_n,"
-           "force_rendered_n,feed_mm_per_s,density_g_cm3,engaged,rpm,torque_nmm,law_out_of_range,cortex_mm,seated,"
-           "blows\n";
+           "force_rendered_n,feed_mm_per_s,density_g_cm3,engaged,rpm,torque_nmm,law_out_of_range,author,suction,"
+           "cortex_mm,seated,blows,blow_impulse_n_s\n";
   return {};
 }
 
@@ -85,16 +86,17 @@ void SessionLog::write(const TickRow& row, const std::string& tool) {
   const LoopReport& r = row.report;
   const Vec3& tip = r.pose_bone_proxy.position_mm;
   const double rendered_n = shows_force_ ? row.force_rendered_n : 0.0;
-  char line[384];
-  const int size =
-      std::snprintf(line, sizeof line,
-                    "%.3f,%lld,%llu,%s,%s,%.5f,%.5f,%.5f,%.5f,%.5f,%.4f,%.4f,%.5f,%.4f,%.4f,%.2f,%.3f,%u,%.3f,%.4f,"
-                    "%u\n",
-                    1e-9 * static_cast<double>(row.mono_ns - first_mono_ns_), static_cast<long long>(row.mono_ns),
-                    static_cast<unsigned long long>(r.state_seq), name(r.cutting.phase), tool.c_str(), tip.x(), tip.y(),
-                    tip.z(), row.depth_mm, row.device_depth_mm, r.coupling.force_n.norm(), rendered_n,
-                    r.cutting.feed_mm_per_s, r.cutting.density_g_cm3, r.cutting.engaged, r.spindle_rpm,
-                    r.cutting.torque_nmm, r.cutting.out_of_range, row.cortex_mm, r.cutting.seated, r.cutting.blows);
+  char line[512];
+  const int size = std::snprintf(
+      line, sizeof line,
+      "%.3f,%lld,%llu,%s,%s,%.5f,%.5f,%.5f,%.5f,%.5f,%.4f,%.4f,%.5f,%.4f,%.4f,%.2f,%.3f,%u,%llu,%d,%.3f,%.4f,%u,"
+      "%.3f\n",
+      1e-9 * static_cast<double>(row.mono_ns - first_mono_ns_), static_cast<long long>(row.mono_ns),
+      static_cast<unsigned long long>(r.state_seq), name(r.cutting.phase), tool.c_str(), tip.x(), tip.y(), tip.z(),
+      row.depth_mm, row.device_depth_mm, r.coupling.force_n.norm(), rendered_n, r.cutting.feed_mm_per_s,
+      r.cutting.density_g_cm3, r.cutting.engaged, r.spindle_rpm, r.cutting.torque_nmm, r.cutting.out_of_range,
+      static_cast<unsigned long long>(author_.value), (row.reading.buttons & kSuction) != 0, row.cortex_mm,
+      r.cutting.seated, r.cutting.blows, r.cutting.blow_impulse_n_s);
   file_.write(line, size);
 }
 

@@ -86,9 +86,9 @@ class RangeWatch {
 // Rows are written at once; finish() reports a full disk.
 class SessionLog {
  public:
-  // Without a path everything is dropped. `device`: the one in the hand; one without motors shows no force. Error
-  // internal: the file cannot be created.
-  [[nodiscard]] Result<void> open(const std::filesystem::path& file, const DeviceInfo& device);
+  // Without a path everything is dropped. `device`: the one in the hand; one without motors shows no force. `author`:
+  // of the states, by which the sound is made again. Error internal: the file cannot be created.
+  [[nodiscard]] Result<void> open(const std::filesystem::path& file, const DeviceInfo& device, AuthorId author);
   void write(const TickRow& row, const std::string& tool);
   [[nodiscard]] Result<void> finish();
 
@@ -96,6 +96,7 @@ class SessionLog {
   std::filesystem::path path_;
   std::ofstream file_;
   bool shows_force_ = true;
+  AuthorId author_;
   std::int64_t first_mono_ns_ = 0;  // of the first row; 0: none yet
 };
 

@@ -14,8 +14,8 @@
 
 #include "common/input/pointer_link.hpp"
 #include "common/mechanics/force_law.hpp"
-#include "haptic_client/device/hdf5_handle.hpp"
-#include "haptic_client/device/recording_layout.hpp"
+#include "common/recording/hdf5_handle.hpp"
+#include "common/recording/recording_layout.hpp"
 
 namespace osteon::haptic {
 namespace {
@@ -315,7 +315,7 @@ void RecordFile::Impl::make_columns() {
   add(column<double, R>("high_frequency_poses/device_pose/pose", "mm, mm, mm, 1, 1, 1, 1", kBone,
                         "the tool's pose that the hand asks for",
                         [](const R& r) { return numbers(r.report.pose_bone_device); }));
-  add(column<double, R>("high_frequency_poses/drill_pose/pose", "mm, mm, mm, 1, 1, 1, 1", kBone,
+  add(column<double, R>(recording::kToolPose, "mm, mm, mm, 1, 1, 1, 1", kBone,
                         "the tool's pose that the bone allows: the proxy",
                         [](const R& r) { return numbers(r.report.pose_bone_proxy); }));
   add(column<double, R>(recording::kBonePose, "mm, mm, mm, 1, 1, 1, 1", "rest",
@@ -329,27 +329,27 @@ void RecordFile::Impl::make_columns() {
   add(column<float, R>(
       "drill_force_feedback/motor_force", "N, N, N", kDevice, "the motor's part of the force: drag, kick, vibration",
       [forces](const R& r) { return numbers(forces ? r.report.motor.device_n : Vec3(Vec3::Zero())); }));
-  add(column<float, R>("drill_force_physical/wrench", "N, N, N, N.mm, N.mm, N.mm", kBone,
-                       "of the bone on the tool, not scaled",
+  add(column<float, R>(recording::kWrench, "N, N, N, N.mm, N.mm, N.mm", kBone, "of the bone on the tool, not scaled",
                        [](const R& r) { return wrench(r.report.coupling.force_n, r.report.coupling.torque_nmm); }));
   add(column<float, R>("drill_force_physical/cutting_force", "N, N, N", kBone,
                        "of the tool on the bone, by the law alone",
                        [](const R& r) { return numbers(r.report.cutting.force_n); }));
-  add(column<std::int64_t, R>("data/mono_ns", "ns", "", "the machine's monotonic clock, as in every log of the session",
+  add(column<std::int64_t, R>(recording::kMonoNs, "ns", "",
+                              "the machine's monotonic clock, as in every log of the session",
                               [](const R& r) { return r.mono_ns; }));
   add(column<std::uint64_t, R>(recording::kTick, "1", "", "number of the tick and of its cutting state",
                                [](const R& r) { return r.report.state_seq; }));
-  add(column<float, R>("data/spindle_rpm", "1/min", "", "speed of the spindle",
+  add(column<float, R>(recording::kSpindleRpm, "1/min", "", "speed of the spindle",
                        [](const R& r) { return r.report.spindle_rpm; }));
   add(column<double, R>(recording::kCommandedRpm, "1/min", "", "speed that the pedal commands",
                         [](const R& r) { return r.commanded_rpm; }));
-  add(column<float, R>("data/feed", "mm/s", "", "into bone, along the direction of cutting",
+  add(column<float, R>(recording::kFeed, "mm/s", "", "into bone, along the direction of cutting",
                        [](const R& r) { return r.report.cutting.feed_mm_per_s; }));
-  add(column<float, R>("data/density", "g/cm3", "", "of the bone being cut, weighted by engaged area",
+  add(column<float, R>(recording::kDensity, "g/cm3", "", "of the bone being cut, weighted by engaged area",
                        [](const R& r) { return r.report.cutting.density_g_cm3; }));
-  add(column<float, R>("data/engaged", "1", "", "share of the leading area that is in bone",
+  add(column<float, R>(recording::kEngaged, "1", "", "share of the leading area that is in bone",
                        [](const R& r) { return r.report.cutting.engaged; }));
-  add(column<float, R>("data/torque", "N.mm", "", "torque of the bone on the spindle",
+  add(column<float, R>(recording::kTorque, "N.mm", "", "torque of the bone on the spindle",
                        [](const R& r) { return r.report.cutting.torque_nmm; }));
   add(column<float, R>("data/cutting_work", "mJ", "", "work of the law's force over the path cut in the tick",
                        [](const R& r) { return r.report.cutting.work_mj; }));
@@ -370,15 +370,15 @@ void RecordFile::Impl::make_columns() {
                        [](const R& r) { return r.report.contact.guide_play_mm; }));
   add(column<float, R>("data/flutes_full", "1", "", "share of the tool's flutes that chips fill",
                        [](const R& r) { return r.report.cutting.flutes_full; }));
-  add(column<float, R>("data/cortex", "mm", "", "thickness of the cortical layer that the tool cuts, 0 for none",
+  add(column<float, R>(recording::kCortex, "mm", "", "thickness of the cortical layer that the tool cuts, 0 for none",
                        [](const R& r) { return r.cortex_mm; }));
-  add(column<float, R>("data/seated", "1", "", "of a broach: its resistance over that at which it is seated",
+  add(column<float, R>(recording::kSeated, "1", "", "of a broach: its resistance over that at which it is seated",
                        [](const R& r) { return r.report.cutting.seated; }));
-  add(column<std::uint32_t, R>("data/blows", "1", "", "blows on the tool so far",
+  add(column<std::uint32_t, R>(recording::kBlows, "1", "", "blows on the tool so far",
                                [](const R& r) { return r.report.cutting.blows; }));
-  add(column<float, R>("data/blow_impulse", "N.s", "", "of the newest blow",
+  add(column<float, R>(recording::kBlowImpulse, "N.s", "", "of the newest blow",
                        [](const R& r) { return r.report.cutting.blow_impulse_n_s; }));
-  add(enumeration<R>("data/state", "what the tool does to the bone",
+  add(enumeration<R>(recording::kState, "what the tool does to the bone",
                      {{{"idle", 1}, {"free", 2}, {"cutting", 3}, {"rubbing", 4}}},
                      [](const R& r) { return static_cast<int>(r.report.cutting.phase); }));
   Names phases;
@@ -387,7 +387,7 @@ void RecordFile::Impl::make_columns() {
   add(enumeration<R>(recording::kPhase, "phase of the current step", phases,
                      [](const R& r) { return static_cast<int>(r.phase); }));
   add(column<std::uint32_t, R>("data/step", "1", "", "of the plan, from 0", [](const R& r) { return r.step; }));
-  add(column<std::uint8_t, R>("data/tool", "1", "", "tool in hand: its index in metadata/tools",
+  add(column<std::uint8_t, R>(recording::kTool, "1", "", "tool in hand: its index in metadata/tools",
                               [](const R& r) { return r.report.tool; }));
   add(column<std::uint8_t, R>(recording::kLaw, "1", "", "force law of the tool: its index in metadata/laws",
                               [this](const R& r) { return law_of(r.report); }));
@@ -467,7 +467,7 @@ bool RecordFile::Impl::make_metadata() {
             set_text(g, recording::kCaseHash, info.case_hash) && set_text(g, recording::kCaseTitle, info.case_title) &&
             set_text(g, recording::kPlanDigest, info.plan_digest) &&
             set_text(g, recording::kForceChoice, std::string(name(info.loop.choice))) &&
-            set_integer(g, "author", static_cast<std::int64_t>(info.author));
+            set_integer(g, recording::kAuthor, static_cast<std::int64_t>(info.author));
   for (const auto& [name, value] : numbers_of_device) ok = ok && set_number(g, name, value);
   std::vector<std::string> tools;
   for (const RecordingInfo::Item& tool : info.tools) {

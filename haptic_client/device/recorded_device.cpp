@@ -1,202 +1,18 @@
 #include "haptic_client/device/recorded_device.hpp"
 
-#include <hdf5.h>
-
 #include <cmath>
 #include <optional>
 
 #include "common/input/pointer_link.hpp"
 #include "common/mechanics/force_law.hpp"
-#include "haptic_client/device/hdf5_handle.hpp"
-#include "haptic_client/device/recording_layout.hpp"
+#include "common/recording/recording_reader.hpp"
 
 namespace osteon::haptic {
 namespace {
 
 constexpr double kMostRpm = 1e6;
 
-// A recording being read, and the message of the first error in it.
-class Reader {
- public:
-  explicit Reader(const std::filesystem::path& file) : path_(file), name_("the recording " + file.string()) {}
-
-  bool open() {
-    H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
-    std::error_code none;
-    if (!std::filesystem::is_regular_file(path_, none))
-      return wrong(ErrorCode::not_found, "there is no file " + path_.string() + "; give one that --record wrote");
-    if (H5Fis_hdf5(path_.c_str()) <= 0)
-      return wrong(ErrorCode::invalid_input, path_.string() + " is not an HDF5 file; give one that --record wrote");
-    // A file that is being written, or whose writer was killed, opens only in this mode. A file of another program
-    // perhaps opens only in the other mode.
-    // In this mode HDF5 reads a part with a wrong checksum again, because a writer may just have changed it. It waits
-    // 1 ns, and each time twice as long. Its own limit of 100 attempts never ends in a damaged file; 24 take 17 ms.
-    constexpr unsigned kAttempts = 24;
-    const Hdf5Handle access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
-    H5Pset_metadata_read_attempts(access.id(), kAttempts);
-    file_ = Hdf5Handle(H5Fopen(path_.c_str(), H5F_ACC_RDONLY | H5F_ACC_SWMR_READ, access.id()), H5Fclose);
-    if (!file_.ok()) file_ = Hdf5Handle(H5Fopen(path_.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT), H5Fclose);
-    if (!file_.ok())
-      return wrong(ErrorCode::invalid_input,
-                   name_ + " cannot be opened: it is damaged, or another program has it open");
-    return true;
-  }
-
-  std::string text(const char* group, const char* name) {
-    const Hdf5Handle attribute = find(group, name);
-    if (!attribute.ok()) return {};
-    const Hdf5Handle type(H5Aget_type(attribute.id()), H5Tclose);
-    if (H5Tget_class(type.id()) != H5T_STRING || H5Tis_variable_str(type.id()) <= 0) {
-      wrong(ErrorCode::invalid_input, name_ + ": the attribute \"" + name + "\" is not a text");
-      return {};
-    }
-    char* read = nullptr;
-    if (H5Aread(attribute.id(), type.id(), &read) < 0 || !read) {
-      damaged(name);
-      return {};
-    }
-    std::string value = read;
-    H5free_memory(read);
-    return value;
-  }
-
-  double number(const char* group, const char* name) {
-    const Hdf5Handle attribute = find(group, name);
-    double value = 0.0;
-    if (attribute.ok() && (H5Aread(attribute.id(), H5T_NATIVE_DOUBLE, &value) < 0 || !std::isfinite(value)))
-      damaged(name);
-    return value;
-  }
-
-  [[nodiscard]] bool has(const char* name, const char* group = ".") const {
-    return H5Aexists_by_name(file_.id(), group, name, H5P_DEFAULT) > 0;
-  }
-
-  [[nodiscard]] bool has_dataset(const char* path) const {
-    return H5Oexists_by_name(file_.id(), path, H5P_DEFAULT) > 0;
-  }
-
-  // A list of strings of one length.
-  std::vector<std::string> texts(const char* path) {
-    const Hdf5Handle dataset = find_dataset(path);
-    if (!dataset.ok()) return {};
-    const Hdf5Handle space(H5Dget_space(dataset.id()), H5Sclose), type(H5Dget_type(dataset.id()), H5Tclose);
-    const hssize_t count = H5Sget_simple_extent_npoints(space.id());
-    const std::size_t size = H5Tget_size(type.id());
-    constexpr hssize_t kMostTexts = 10'000;
-    if (H5Tget_class(type.id()) != H5T_STRING || H5Tis_variable_str(type.id()) != 0 || count < 0 ||
-        count > kMostTexts || size == 0 || size > 4096) {
-      wrong(ErrorCode::invalid_input, name_ + ": the dataset \"" + path + "\" is not a list of texts");
-      return {};
-    }
-    std::string all(static_cast<std::size_t>(count) * size, '\0');
-    if (count > 0 && H5Dread(dataset.id(), type.id(), H5S_ALL, H5S_ALL, H5P_DEFAULT, all.data()) < 0) {
-      damaged(path);
-      return {};
-    }
-    std::vector<std::string> texts;
-    for (std::size_t i = 0; i < static_cast<std::size_t>(count); ++i)
-      texts.emplace_back(std::string(all.substr(i * size, size).c_str()));
-    return texts;
-  }
-
-  // A hash; empty if it is missing or was not set.
-  [[nodiscard]] std::string digits(const char* path) const {
-    const Hdf5Handle dataset(H5Dopen2(file_.id(), path, H5P_DEFAULT), H5Dclose), type(H5Tcopy(H5T_C_S1), H5Tclose);
-    char digits[65] = {};
-    H5Tset_size(type.id(), 64);
-    H5Tset_strpad(type.id(), H5T_STR_NULLPAD);
-    H5Tset_cset(type.id(), H5T_CSET_UTF8);
-    if (!dataset.ok() || H5Dread(dataset.id(), type.id(), H5S_ALL, H5S_ALL, H5P_DEFAULT, digits) < 0) return {};
-    return digits;
-  }
-
-  // Number of complete rows: those that have their time.
-  std::size_t rows(const char* path = recording::kTime) {
-    const Hdf5Handle dataset = find_dataset(path);
-    if (!dataset.ok()) return 0;
-    const Hdf5Handle space(H5Dget_space(dataset.id()), H5Sclose);
-    const hssize_t count = H5Sget_simple_extent_npoints(space.id());
-    return count > 0 ? static_cast<std::size_t>(count) : 0;
-  }
-
-  // The first `rows` rows of a dataset with `width` values in a row.
-  template <class T>
-  std::vector<T> values(const char* path, hid_t type, std::size_t rows, std::size_t width) {
-    const Hdf5Handle dataset = find_dataset(path);
-    if (!dataset.ok()) return {};
-    const Hdf5Handle space(H5Dget_space(dataset.id()), H5Sclose), stored(H5Dget_type(dataset.id()), H5Tclose);
-    hsize_t size[2] = {0, 1};
-    const int rank = H5Sget_simple_extent_ndims(space.id());
-    if (rank < 1 || rank > 2 || H5Sget_simple_extent_dims(space.id(), size, nullptr) != rank || size[1] != width) {
-      wrong(ErrorCode::invalid_input,
-            name_ + ": the dataset \"" + path + "\" has not " + std::to_string(width) + " values in a row");
-      return {};
-    }
-    if (size[0] < rows) {
-      wrong(ErrorCode::invalid_input,
-            name_ + ": the dataset \"" + path + "\" has fewer rows than \"" + recording::kTime + "\"");
-      return {};
-    }
-    const hsize_t from[] = {0, 0}, count[] = {rows, width};
-    const Hdf5Handle memory(H5Screate_simple(rank, count, nullptr), H5Sclose);
-    // Enumerations are stored as small integers with names; here they are read as integers.
-    const bool named = H5Tget_class(stored.id()) == H5T_ENUM;
-    std::vector<T> read(rows * width);
-    if (H5Sselect_hyperslab(space.id(), H5S_SELECT_SET, from, nullptr, count, nullptr) < 0 ||
-        H5Dread(dataset.id(), named ? stored.id() : type, memory.id(), space.id(), H5P_DEFAULT, read.data()) < 0 ||
-        (named && H5Tget_size(stored.id()) != sizeof(T)))
-      damaged(path);
-    return read;
-  }
-
-  // The value of a name in an enumeration.
-  std::optional<std::uint8_t> enumerator(const char* path, const char* name) {
-    const Hdf5Handle dataset = find_dataset(path);
-    if (!dataset.ok()) return {};
-    const Hdf5Handle type(H5Dget_type(dataset.id()), H5Tclose);
-    std::uint8_t value = 0;
-    if (H5Tget_class(type.id()) != H5T_ENUM || H5Tget_size(type.id()) != sizeof value ||
-        H5Tenum_valueof(type.id(), name, &value) < 0) {
-      damaged(path);
-      return {};
-    }
-    return value;
-  }
-
-  bool wrong(ErrorCode code, const std::string& sentence) {
-    if (!error_) error_ = Error{code, sentence};
-    return false;
-  }
-  bool damaged(const char* what) {
-    return wrong(ErrorCode::invalid_input, name_ + ": \"" + what + "\" cannot be read; the file is damaged");
-  }
-  [[nodiscard]] bool ok() const { return !error_; }
-  [[nodiscard]] const Error& error() const { return *error_; }
-  [[nodiscard]] const std::string& name() const { return name_; }
-
- private:
-  Hdf5Handle find(const char* group, const char* name) {
-    Hdf5Handle attribute(H5Aopen_by_name(file_.id(), group, name, H5P_DEFAULT, H5P_DEFAULT), H5Aclose);
-    if (!attribute.ok())
-      wrong(ErrorCode::invalid_input,
-            name_ + " has no attribute \"" + name + "\" of \"" + group + "\"; it is not what --record writes");
-    return attribute;
-  }
-  Hdf5Handle find_dataset(const char* path) {
-    Hdf5Handle dataset(H5Dopen2(file_.id(), path, H5P_DEFAULT), H5Dclose);
-    if (!dataset.ok())
-      wrong(ErrorCode::invalid_input, name_ + " has no dataset \"" + path + "\"; it is not what --record writes");
-    return dataset;
-  }
-
-  std::filesystem::path path_;
-  std::string name_;
-  Hdf5Handle file_;
-  std::optional<Error> error_;
-};
-
-DeviceLimits limits_of(Reader& reader) {
+DeviceLimits limits_of(RecordingReader& reader) {
   const char* g = recording::kMetadata;
   DeviceLimits limits;
   limits.peak_n = reader.number(g, recording::kPeak);
@@ -219,18 +35,17 @@ bool good(const Pose& pose) {
 
 // Reads the readings tick by tick, and the bone's poses. A gap in the ticks' numbers is filled with the preceding
 // reading.
-void read_rows(Reader& reader, RecordedSession& session) {
+void read_rows(RecordingReader& reader, RecordedSession& session) {
   std::vector<DeviceReading>& readings = session.readings;
   const std::size_t rows = reader.rows();
-  const auto poses = reader.values<double>(recording::kHandlePose, H5T_NATIVE_DOUBLE, rows, 7);
-  const auto buttons = reader.values<std::uint32_t>(recording::kButtons, H5T_NATIVE_UINT32, rows, 1);
-  const auto pedal = reader.values<double>(recording::kPedal, H5T_NATIVE_DOUBLE, rows, 1);
-  const auto status = reader.values<std::uint8_t>(recording::kDeviceStatus, H5T_NATIVE_UINT8, rows, 1);
-  const auto calibration = reader.values<std::uint8_t>(recording::kCalibration, H5T_NATIVE_UINT8, rows, 1);
-  const auto ticks = reader.values<std::uint64_t>(recording::kTick, H5T_NATIVE_UINT64, rows, 1);
+  const auto poses = reader.values<double>(recording::kHandlePose, rows, 7);
+  const auto buttons = reader.values<std::uint32_t>(recording::kButtons, rows, 1);
+  const auto pedal = reader.values<double>(recording::kPedal, rows, 1);
+  const auto status = reader.values<std::uint8_t>(recording::kDeviceStatus, rows, 1);
+  const auto calibration = reader.values<std::uint8_t>(recording::kCalibration, rows, 1);
+  const auto ticks = reader.values<std::uint64_t>(recording::kTick, rows, 1);
   std::vector<double> bone;
-  if (reader.has_dataset(recording::kBonePose))
-    bone = reader.values<double>(recording::kBonePose, H5T_NATIVE_DOUBLE, rows, 7);
+  if (reader.has_dataset(recording::kBonePose)) bone = reader.values<double>(recording::kBonePose, rows, 7);
   if (!reader.ok()) return;
   bool moves = false;
   std::vector<Pose>& places = session.pose_rest_bone;
@@ -267,16 +82,16 @@ void read_rows(Reader& reader, RecordedSession& session) {
   if (!moves) places = {};
 }
 
-void read_take_ups(Reader& reader, RecordedSession& session) {
+void read_take_ups(RecordingReader& reader, RecordedSession& session) {
   const std::size_t count = reader.rows(recording::kTakeUpRow);
   if (count == 0) return;
-  const auto rows = reader.values<std::uint64_t>(recording::kTakeUpRow, H5T_NATIVE_UINT64, count, 1);
-  const auto tools = reader.values<std::uint8_t>(recording::kTakeUpTool, H5T_NATIVE_UINT8, count, 1);
-  const auto poses = reader.values<double>(recording::kTakeUpPose, H5T_NATIVE_DOUBLE, count, 7);
-  const auto views = reader.values<double>(recording::kTakeUpView, H5T_NATIVE_DOUBLE, count, 4);
-  const auto scales = reader.values<double>(recording::kTakeUpScale, H5T_NATIVE_DOUBLE, count, 1);
-  const auto devices = reader.values<double>(recording::kTakeUpDevice, H5T_NATIVE_DOUBLE, count, 3);
-  const auto bones = reader.values<double>(recording::kTakeUpBone, H5T_NATIVE_DOUBLE, count, 3);
+  const auto rows = reader.values<std::uint64_t>(recording::kTakeUpRow, count, 1);
+  const auto tools = reader.values<std::uint8_t>(recording::kTakeUpTool, count, 1);
+  const auto poses = reader.values<double>(recording::kTakeUpPose, count, 7);
+  const auto views = reader.values<double>(recording::kTakeUpView, count, 4);
+  const auto scales = reader.values<double>(recording::kTakeUpScale, count, 1);
+  const auto devices = reader.values<double>(recording::kTakeUpDevice, count, 3);
+  const auto bones = reader.values<double>(recording::kTakeUpBone, count, 3);
   if (!reader.ok()) return;
   for (std::size_t i = 0; i < count; ++i) {
     if (rows[i] >= session.pointer.size()) break;  // of a row that is not complete
@@ -300,7 +115,7 @@ void read_take_ups(Reader& reader, RecordedSession& session) {
 }
 
 // What the hand of a pointer did besides moving the handle.
-void read_pointer(Reader& reader, RecordedSession& session) {
+void read_pointer(RecordingReader& reader, RecordedSession& session) {
   if (!reader.ok() || session.device != recording::kPointer) return;
   if (!reader.has_dataset(recording::kPointerSource)) {
     reader.wrong(ErrorCode::unsupported, reader.name() +
@@ -309,7 +124,7 @@ void read_pointer(Reader& reader, RecordedSession& session) {
     return;
   }
   const std::size_t rows = reader.rows();
-  const auto ticks = reader.values<std::uint64_t>(recording::kTick, H5T_NATIVE_UINT64, rows, 1);
+  const auto ticks = reader.values<std::uint64_t>(recording::kTick, rows, 1);
   if (!reader.ok()) return;
   if (rows != session.readings.size() || ticks.front() != 1) {
     reader.wrong(ErrorCode::unsupported, reader.name() +
@@ -317,11 +132,11 @@ void read_pointer(Reader& reader, RecordedSession& session) {
                                              "was; record it again on a machine with less load");
     return;
   }
-  const auto rpm = reader.values<double>(recording::kCommandedRpm, H5T_NATIVE_DOUBLE, rows, 1);
-  const auto phase = reader.values<std::uint8_t>(recording::kPhase, H5T_NATIVE_UINT8, rows, 1);
-  const auto source = reader.values<std::uint8_t>(recording::kPointerSource, H5T_NATIVE_UINT8, rows, 1);
-  const auto law = reader.values<std::uint8_t>(recording::kLaw, H5T_NATIVE_UINT8, rows, 1);
-  const auto wear = reader.values<double>(recording::kWear, H5T_NATIVE_DOUBLE, rows, 1);
+  const auto rpm = reader.values<double>(recording::kCommandedRpm, rows, 1);
+  const auto phase = reader.values<std::uint8_t>(recording::kPhase, rows, 1);
+  const auto source = reader.values<std::uint8_t>(recording::kPointerSource, rows, 1);
+  const auto law = reader.values<std::uint8_t>(recording::kLaw, rows, 1);
+  const auto wear = reader.values<double>(recording::kWear, rows, 1);
   session.laws = reader.texts(recording::kLaws);
   if (!reader.ok()) return;
   const auto in_hand = reader.enumerator(recording::kPhase, "free_hand");
@@ -339,16 +154,8 @@ void read_pointer(Reader& reader, RecordedSession& session) {
 }  // namespace
 
 Result<RecordedSession> read_recording(const std::filesystem::path& file) {
-  Reader reader(file);
+  RecordingReader reader(file);
   if (!reader.open()) return tl::unexpected(reader.error());
-  if (!reader.has(recording::kFormatName) || reader.text(".", recording::kFormatName) != recording::kFormat)
-    return failure(ErrorCode::invalid_input,
-                   file.string() + " is HDF5, but no recording of Osteon; give one that --record wrote");
-  const int version = static_cast<int>(reader.number(".", recording::kVersionName));
-  if (reader.ok() && version != recording::kVersion)
-    return failure(ErrorCode::unsupported, reader.name() + " is of version " + std::to_string(version) +
-                                               " of the format; this program reads version " +
-                                               std::to_string(recording::kVersion));
   RecordedSession session;
   const char* g = recording::kMetadata;
   session.device = reader.text(g, recording::kDevice);

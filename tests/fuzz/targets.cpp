@@ -21,6 +21,7 @@
 #include "tests/fuzz/pointer_target.hpp"
 #include "tests/fuzz/requests_target.hpp"
 #include "tests/fuzz/samples.hpp"
+#include "tests/fuzz/sound_targets.hpp"
 #include "tests/fuzz/ticket_target.hpp"
 #include "tests/fuzz/upload_target.hpp"
 
@@ -257,7 +258,10 @@ std::vector<Target> targets() {
       label_header_target(),
       dicom_segments_target(),
       pointer_message_target(),
-      sound_message_target()};
+      sound_message_target(),
+      wav_file_target(),
+      sound_model_target(),
+      session_log_target()};
 }
 
 }  // namespace osteon::fuzz

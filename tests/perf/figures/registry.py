@@ -72,6 +72,13 @@ INSIDER_ATTACKS = (("killing", "send a header that once ended the server"),
 HOURS_OF = ("osteon", "osteon-server", "osteon-haptic", "osteon-audio")  # the window and its children
 # Bounds of SNR, PSD, mel bands and envelope: about what sms-tools 1.2.1 reaches, and less for the hammer.
 SOUND_MODELS = {"drill": (7.5, 1.8, 2.1, 0.65), "saw": (6.0, 3.4, 2.4, 0.9), "hammer": (7.6, 3.4, 2.5, 1.0)}
+# What a listener hears, and in which words; bounds of the share of frames at 20 and 6 dB.
+SOUND_LISTENERS = (("spectrum", "the sound", {20: 0.95, 6: 0.85}),
+                   ("equal_rms", "the sound, all windows of 50 ms at one level", {}),
+                   ("level_only", "the level alone", {}))
+SOUND_TRUTHS = (("accuracy", "share of frames of 10 ms that are named rightly"),
+                ("mean_recall", "mean of the five classes' shares of frames that are named rightly"),
+                ("transitions", "share of changes of class that are named within 50 ms"))
 MACHINE = "a thread that wakes 20 times a second and syncs 4 KB to the disk, in the same runs"
 
 FIGURES = [
@@ -134,6 +141,11 @@ FIGURES = [
         ("shift_error", "percent", "largest difference of a line's fall under load from 1.8 %", ("<=", 0.05)),
         ("speed", "times_real_time", "length of the sound of a drill over the processor's time of its synthesis",
          (">=", 100.0)))],
+    # Silent, free, cortical, cancellous and perforation, told by a classifier that never heard the seed, speed or tool.
+    # Smallest and largest: of the sets of other drillings, other speeds and each other tool.
+    *[Figure(f"sound_classes_{listener}_{truth}_{snr}db", "share", f"{what} by {heard}, white noise {snr} dB below the "
+             "tool", "sound_classes", (">=", bounds[snr]) if truth == "accuracy" and bounds else None)
+      for listener, heard, bounds in SOUND_LISTENERS for truth, what in SOUND_TRUTHS for snr in (20, 6)],
     # Required physics: phantom 5/20/5 mm at 1.9/0.3/1.9 g/cm3, drill 3.2 mm, 1000 rpm.
     Figure("rig_force_cortical_error", "percent", "thrust in the cortical layers at 1 mm/s against Chi's law (28.9 N)",
            "rig", ("<=", 3.0)),

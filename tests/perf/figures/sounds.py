@@ -86,4 +86,25 @@ def tools(run):
     return values | {"tool_sound_speed": Measured(float(np.median(speeds)), None, min(speeds), max(speeds), 1)}
 
 
-GROUPS = {"sound_analysis": analysis, "sound_binaural": binaural, "sound_model": models, "tool_sound": tools}
+# Of osteon-sound-classifier: by the spectrum, by that of windows of equal level, and by the level alone.
+LISTENERS, SNRS_DB = ("spectrum", "equal_rms", "level_only"), (20, 6)
+
+
+def classes(run):
+    run.say("what a drill does, told by its sound alone")
+    trials = json.loads(run.output("osteon-sound-classifier", "--json"))
+    values = {}
+    for listener in LISTENERS:
+        for snr in SNRS_DB:
+            trial = trials[f"{listener}_{snr}db"]
+            for what in ("accuracy", "mean_recall", "transitions"):
+                sets = [numbers[what] for numbers in trial["sets"].values()]
+                values[f"sound_classes_{listener}_{what}_{snr}db"] = Measured(trial[what], None, min(sets), max(sets))
+            run.tables.append((f"sound classes, {listener}, noise {snr} dB below: what it was, and frames named so",
+                               [("", *trials["classes"])] +
+                               [(name, *row) for name, row in zip(trials["classes"], trial["confusion"])]))
+    return values
+
+
+GROUPS = {"sound_analysis": analysis, "sound_binaural": binaural, "sound_model": models, "sound_classes": classes,
+          "tool_sound": tools}

@@ -391,7 +391,7 @@ TEST(Recording, ADeviceWithoutMotorsShowsNothing) {
     ASSERT_TRUE(recording->append({&one, 1}));
     ASSERT_TRUE(recording->finish({}));
     SessionLog lines;
-    ASSERT_TRUE(lines.open(log, info.device_info));
+    ASSERT_TRUE(lines.open(log, info.device_info, AuthorId{7}));
     lines.write(one, "drill-3.2");
     ASSERT_TRUE(lines.finish());
     const auto read = python(

@@ -1,4 +1,4 @@
-// Names in a recording, which haptic_client/app writes and the recorded device and h5py read.
+// Names in a recording, which haptic_client/app writes, and the recorded device, the sound and h5py read.
 //
 // The groups are those of the recordings of FIVRS, the volumetric drilling simulator on AMBF. Source:
 // github.com/LCSR-SICKKIDS/volumetric_drilling, its recording script and the description of its format. The groups are
@@ -8,7 +8,7 @@
 // `voxels_removed`.
 #pragma once
 
-namespace osteon::haptic::recording {
+namespace osteon::recording {
 
 // Attributes of the file.
 inline constexpr const char* kFormatName = "format";
@@ -22,6 +22,22 @@ inline constexpr const char* kTick = "data/state_seq";
 inline constexpr const char* kHandlePose = "high_frequency_poses/handle_pose/pose";
 // Of a bone on its mount; older recordings have none.
 inline constexpr const char* kBonePose = "high_frequency_poses/bone_pose/pose";
+// What the tool does: see the readme in the file for frames.
+inline constexpr const char* kToolPose = "high_frequency_poses/drill_pose/pose";
+inline constexpr const char* kWrench = "drill_force_physical/wrench";
+inline constexpr const char* kMonoNs = "data/mono_ns";
+inline constexpr const char* kSpindleRpm = "data/spindle_rpm";
+inline constexpr const char* kFeed = "data/feed";
+inline constexpr const char* kDensity = "data/density";
+inline constexpr const char* kEngaged = "data/engaged";
+inline constexpr const char* kTorque = "data/torque";
+inline constexpr const char* kState = "data/state";
+inline constexpr const char* kTool = "data/tool";
+// Recordings without a cortical layer, a broach or blows lack these.
+inline constexpr const char* kCortex = "data/cortex";
+inline constexpr const char* kSeated = "data/seated";
+inline constexpr const char* kBlows = "data/blows";
+inline constexpr const char* kBlowImpulse = "data/blow_impulse";
 inline constexpr const char* kButtons = "data/buttons";
 inline constexpr const char* kPedal = "data/pedal";
 inline constexpr const char* kDeviceStatus = "data/device_status";
@@ -45,6 +61,7 @@ inline constexpr const char* kTakeUpBone = "burr_change/anchor_bone";
 
 // Attributes of the group `metadata`: the device's DeviceLimits and DeviceInfo.
 inline constexpr const char* kMetadata = "metadata";
+inline constexpr const char* kAuthor = "author";  // in the room
 inline constexpr const char* kDevice = "device";
 inline constexpr const char* kPointer = "pointer";  // the device of a hand that a mouse, pen or game pad leads
 inline constexpr const char* kModel = "device_model";
@@ -73,4 +90,4 @@ inline constexpr const char* kStartHash = "metadata/field_hash_at_start";
 // Set at the end.
 inline constexpr const char* kFieldHash = "metadata/field_hash";
 
-}  // namespace osteon::haptic::recording
+}  // namespace osteon::recording

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <utility>
 
-namespace osteon::haptic {
+namespace osteon {
 
 class Hdf5Handle {
  public:
@@ -38,4 +38,4 @@ class Hdf5Handle {
   Close close_ = nullptr;
 };
 
-}  // namespace osteon::haptic
+}  // namespace osteon

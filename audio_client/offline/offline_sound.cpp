@@ -1,0 +1,93 @@
+#include "audio_client/offline/offline_sound.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "audio_client/output/audio_output.hpp"
+#include "audio_client/synth/sound_scene.hpp"
+
+namespace osteon::audio {
+namespace {
+
+constexpr std::int64_t kSecond_ns = 1'000'000'000;
+// As the live client has it: tools whose state was not received for so long run down, which takes at most as long.
+constexpr std::int64_t kStale_ns = 2 * kSecond_ns;
+constexpr int kBuffersPerReport = 64;
+
+// What the live client's reader and engine do, with the record's time instead of a clock.
+class Player {
+ public:
+  Player(StateRecord& record, const SynthParams& params) : record_(record), rate_hz_(params.rate_hz) {
+    synth_.prepare(params);
+  }
+
+  Result<void> begin() {
+    auto first = record_.next();
+    if (!first) return tl::unexpected(first.error());
+    next_ = std::move(*first);
+    if (!next_) return bad_input(record_.name() + " holds no state; record a session");
+    start_ns_ = newest_ns_ = next_->time_ns;
+    return {};
+  }
+
+  // False when the last tool has fallen silent.
+  Result<bool> fill(std::span<float> buffer, OfflineSound& sound) {
+    const std::int64_t now_ns = start_ns_ + std::llround(1e9 * static_cast<double>(sound.frames) / rate_hz_);
+    auto fresh = take_until(now_ns, sound);
+    if (!fresh) return tl::unexpected(fresh.error());
+    if (!*fresh && sounding_ && (!next_ || now_ns - newest_ns_ > kStale_ns)) {
+      synth_.aim(SoundScene{});
+      sounding_ = false;
+    }
+    if (!next_ && !*fresh && (synth_.silent() || now_ns - newest_ns_ > kStale_ns)) return false;
+    synth_.process(buffer);
+    sound.frames += buffer.size();
+    for (const float x : buffer) sound.peak = std::max(sound.peak, std::abs(x));
+    return true;
+  }
+
+ private:
+  // Aims at the newest state up to a time. False if there is no new one.
+  Result<bool> take_until(std::int64_t now_ns, OfflineSound& sound) {
+    std::optional<CuttingState> newest;
+    while (next_ && next_->time_ns <= now_ns) {
+      newest = std::move(next_);
+      ++sound.states;
+      auto more = record_.next();
+      if (!more) return tl::unexpected(more.error());
+      next_ = std::move(*more);
+    }
+    if (!newest) return false;
+    newest_ns_ = newest->time_ns;
+    synth_.aim(sound_scene(std::span(&*newest, 1), now_ns));
+    sounding_ = true;
+    return true;
+  }
+
+  StateRecord& record_;
+  double rate_hz_;
+  DrillSynth synth_;
+  std::optional<CuttingState> next_;
+  std::int64_t start_ns_ = 0, newest_ns_ = 0;
+  bool sounding_ = false;  // a tool was aimed at, and not yet released
+};
+
+}  // namespace
+
+Result<OfflineSound> render_states(StateRecord& record, const SynthParams& params, const TakeFrames& take,
+                                   const KeepGoing& keep_going) {
+  OfflineSound sound;
+  Player player(record, params);
+  if (auto begun = player.begin(); !begun) return tl::unexpected(begun.error());
+  std::vector<float> buffer(OutputParams{}.frames);
+  for (int count = 0;; ++count) {
+    if (count % kBuffersPerReport == 0 && !keep_going(record.done())) return stopped_while("making the sound");
+    const auto more = player.fill(buffer, sound);
+    if (!more) return tl::unexpected(more.error());
+    if (!*more) return sound;
+    if (auto taken = take(buffer); !taken) return tl::unexpected(taken.error());
+  }
+}
+
+}  // namespace osteon::audio

@@ -1,0 +1,11 @@
+// Fuzz targets for files of sounds that untrusted people can send: recordings, models and records of sessions.
+#pragma once
+#include "tests/fuzz/targets.hpp"
+
+namespace osteon::fuzz {
+
+[[nodiscard]] Target wav_file_target();     // WAV and RF64
+[[nodiscard]] Target sound_model_target();  // a spectral model, whose digest is right
+[[nodiscard]] Target session_log_target();  // a CSV of osteon-haptic --session-log
+
+}  // namespace osteon::fuzz

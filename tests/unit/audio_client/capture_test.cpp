@@ -1,0 +1,145 @@
+// osteon-audio record, run by deploy/with-null-sink: a tone that is played into the sink is recorded from its monitor.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <chrono>
+#include <cmath>
+#include <csignal>
+#include <fstream>
+#include <numbers>
+#include <thread>
+
+#include "audio_client/output/audio_output.hpp"
+#include "common/runtime/files.hpp"
+#include "common/sound/levels.hpp"
+#include "common/sound/tones.hpp"
+#include "common/sound/wav_file.hpp"
+#include "tests/support/process.hpp"
+#include "tests/support/temp_dir.hpp"
+#include "tests/support/wait.hpp"
+
+namespace osteon::audio {
+namespace {
+
+using namespace std::chrono_literals;
+using testing::AllOf;
+using testing::HasSubstr;
+
+constexpr double kTone_hz = 1000;
+
+struct SteadyTone final : SoundSource {
+  std::atomic<std::uint64_t> frames{0};
+  void render(std::span<float> mono) noexcept override {
+    const std::uint64_t at = frames.load();
+    for (std::size_t i = 0; i < mono.size(); ++i)
+      mono[i] =
+          static_cast<float>(0.5 * std::cos(2 * std::numbers::pi * kTone_hz * static_cast<double>(at + i) / 48000));
+    frames += mono.size();
+  }
+};
+
+// A tone in the sink, steady before the test begins.
+class RecordCommand : public testing::Test {
+ protected:
+  void SetUp() override {
+    auto output = open_output({.kind = OutputKind::pulse}, tone_);
+    ASSERT_TRUE(output) << output.error().message;
+    output_ = std::move(*output);
+    ASSERT_TRUE(output_->start());
+    // The null sink may stall for 1.5 s at its start.
+    ASSERT_TRUE(test::wait_until([&] { return tone_.frames > 120000; }, 30s));
+  }
+  void TearDown() override { output_->stop(); }
+
+  test::RunResult record(std::vector<std::string> arguments) {
+    arguments.insert(arguments.begin(), "record");
+    return test::run(test::program("osteon-audio"), arguments, 60s);
+  }
+  std::string file() const { return (temp_ / "x.wav").string(); }
+
+  SteadyTone tone_;
+  std::unique_ptr<AudioOutput> output_;
+  test::TempDir temp_;
+};
+
+// A busy machine makes gaps in the sink. The longest half second without one is what counts.
+sound::Tone heard(const sound::WavSound& sound) {
+  const auto half = static_cast<std::size_t>(sound.rate_hz / 2);
+  sound::Tone best{};
+  best.level_db = -200;
+  for (std::size_t at = 0; at + half <= sound.samples.size(); at += half / 2) {
+    const auto tone =
+        sound::find_tone(std::span(sound.samples).subspan(at, half), sound.rate_hz, kTone_hz - 100, kTone_hz + 100);
+    if (tone.level_db > best.level_db) best = tone;
+  }
+  return best;
+}
+
+TEST_F(RecordCommand, RecordsTheDefaultSource) {
+  for (const char* bits : {"16", "24"}) {
+    const auto ran = record({file(), "--seconds", "3", "--bits", bits, "--overwrite"});
+    ASSERT_EQ(ran.exit_code, 0) << ran.err;
+    EXPECT_THAT(ran.out, AllOf(HasSubstr("Monitor of Null Output"), HasSubstr("3.000 s"), HasSubstr("written")));
+    const auto sound = sound::read_wav(file());
+    ASSERT_TRUE(sound) << sound.error().message;
+    EXPECT_EQ(sound->bits, std::atoi(bits));
+    EXPECT_EQ(sound->rate_hz, 48000);
+    EXPECT_EQ(sound->samples.size(), 144000U);
+    const sound::Tone tone = heard(*sound);
+    EXPECT_NEAR(tone.hz, kTone_hz, 1);
+    EXPECT_NEAR(tone.level_db, 20 * std::log10(0.5), 1);
+  }
+}
+
+TEST_F(RecordCommand, AnotherRateAndTwoChannels) {
+  const auto ran =
+      record({file(), "--seconds", "2", "--rate", "44100", "--channels", "2", "--device", "Monitor of Null"});
+  ASSERT_EQ(ran.exit_code, 0) << ran.err;
+  const auto sound = sound::read_wav(file(), {.channel = sound::Channel::right});
+  ASSERT_TRUE(sound) << sound.error().message;
+  EXPECT_EQ(sound->channels, 2);
+  EXPECT_EQ(sound->samples.size(), 88200U);
+  EXPECT_NEAR(heard(*sound).hz, kTone_hz, 1);
+}
+
+TEST_F(RecordCommand, AnInterruptKeepsTheFile) {
+  test::Process audio(test::program("osteon-audio"), {"record", file()});
+  const auto partial = temp_ / ("x.wav.partial-" + std::to_string(audio.pid()));
+  std::error_code none;
+  ASSERT_TRUE(test::wait_until([&] { return std::filesystem::file_size(partial, none) > 100'000 && !none; }, 30s))
+      << audio.err();
+  audio.signal(SIGINT);
+  EXPECT_EQ(audio.wait(30s), 0) << audio.err();
+  const auto sound = sound::read_wav(file());
+  ASSERT_TRUE(sound) << sound.error().message;
+  EXPECT_GT(sound->seconds(), 0.5);
+  EXPECT_NEAR(heard(*sound).hz, kTone_hz, 1);
+  EXPECT_FALSE(std::filesystem::exists(partial));
+}
+
+TEST_F(RecordCommand, NeverLosesAFileThatIsThere) {
+  ASSERT_TRUE(write_file(file(), "an operation that nobody can repeat"));
+  const auto ran = record({file(), "--seconds", "1"});
+  EXPECT_EQ(ran.exit_code, 1);
+  EXPECT_THAT(ran.err, AllOf(HasSubstr("x.wav is already there"), HasSubstr("--overwrite")));
+  EXPECT_EQ(*read_file(file()), "an operation that nobody can repeat");
+}
+
+TEST_F(RecordCommand, NamesTheSourcesThatAreThere) {
+  const auto ran = record({file(), "--seconds", "1", "--device", "theatre 7"});
+  EXPECT_EQ(ran.exit_code, 1);
+  EXPECT_THAT(ran.err, AllOf(HasSubstr("no source of sound named theatre 7"), HasSubstr("Monitor of Null Output")));
+  EXPECT_FALSE(std::filesystem::exists(file()));
+}
+
+TEST_F(RecordCommand, SaysThatNoServerAnswers) {
+  const auto ran = test::run(test::program("osteon-audio"), {"record", file(), "--seconds", "1"}, 60s,
+                             {.environment = {{"PULSE_SERVER", "unix:/nowhere"}}, .without = {}, .folder = {}});
+  EXPECT_EQ(ran.exit_code, 1);
+  EXPECT_THAT(ran.err, AllOf(HasSubstr("no source of sound answers"), HasSubstr("start PulseAudio")));
+  EXPECT_FALSE(std::filesystem::exists(file()));
+}
+
+}  // namespace
+}  // namespace osteon::audio

@@ -1,0 +1,301 @@
+// The sound of a recorded session: which records are read, that the live engine would give the same samples, and the
+// program's command.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <csignal>
+#include <fstream>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "audio_client/offline/offline_sound.hpp"
+#include "audio_client/offline/state_record.hpp"
+#include "audio_client/output/sound_engine.hpp"
+#include "common/runtime/files.hpp"
+#include "common/sound/wav_file.hpp"
+#include "haptic_client/app/record_file.hpp"
+#include "tests/support/process.hpp"
+#include "tests/support/temp_dir.hpp"
+#include "tests/support/wait.hpp"
+#include "tests/unit/audio_client/scripted_drilling.hpp"
+
+namespace osteon::audio {
+namespace {
+
+using namespace std::chrono_literals;
+using testing::AllOf;
+using testing::HasSubstr;
+
+constexpr std::int64_t kBegin_ns = 5'000'000'000;
+constexpr std::size_t kBuffer = 256;
+
+// States as a record has them: 120 in a second.
+std::vector<CuttingState> timed_states() {
+  std::vector<CuttingState> states = test::scripted_drilling().states;
+  for (std::size_t i = 0; i < states.size(); ++i)
+    states[i].time_ns = kBegin_ns + std::llround(1e9 * static_cast<double>(i) / 120.0);
+  return states;
+}
+
+class ListedStates final : public StateRecord {
+ public:
+  explicit ListedStates(std::vector<CuttingState> states) : states_(std::move(states)) {}
+  double done() const override { return static_cast<double>(next_) / static_cast<double>(states_.size()); }
+  std::string name() const override { return "the list"; }
+
+ protected:
+  Result<std::optional<CuttingState>> read() override {
+    if (next_ == states_.size()) return std::optional<CuttingState>();
+    return std::optional(states_[next_++]);
+  }
+  std::string place(const char* field) const override { return std::string("the list: ") + field + " "; }
+
+ private:
+  std::vector<CuttingState> states_;
+  std::size_t next_ = 0;
+};
+
+std::vector<float> rendered(StateRecord& record) {
+  std::vector<float> samples;
+  const auto sound = render_states(
+      record, {},
+      [&](std::span<const float> frames) {
+        samples.insert(samples.end(), frames.begin(), frames.end());
+        return Result<void>();
+      },
+      [](double) { return true; });
+  EXPECT_TRUE(sound) << sound.error().message;
+  return samples;
+}
+
+// What the live program does, with buffers that begin at the first state.
+std::vector<float> live(const std::vector<CuttingState>& states, std::size_t frames) {
+  SoundEngine engine(SynthParams{});
+  std::vector<float> samples(frames);
+  std::size_t next = 0;
+  for (std::size_t at = 0; at + kBuffer <= frames; at += kBuffer) {
+    const std::int64_t now_ns = kBegin_ns + std::llround(1e9 * static_cast<double>(at) / test::kRate_hz);
+    for (; next < states.size() && states[next].time_ns <= now_ns; ++next)
+      engine.deliver(sound_scene(std::span(&states[next], 1), now_ns));
+    engine.render(std::span(samples).subspan(at, kBuffer));
+  }
+  return samples;
+}
+
+TEST(OfflineSound, IsThatOfTheLiveEngineBitForBit) {
+  const std::vector<CuttingState> states = timed_states();
+  ListedStates record(states);
+  const std::vector<float> offline = rendered(record);
+  const std::size_t common = 48000 * states.size() / 120 / kBuffer * kBuffer;
+  ASSERT_GT(offline.size(), common);
+  const std::vector<float> engine = live(states, common);
+  EXPECT_GT(*std::ranges::max_element(engine), 0.1F);
+  EXPECT_TRUE(std::equal(engine.begin(), engine.end(), offline.begin()));
+}
+
+TEST(OfflineSound, RunsDownAfterTheLastStateAndInAGap) {
+  std::vector<CuttingState> states;
+  for (int i = 0; i < 240; ++i) {
+    states.push_back(test::free_drill(1400));
+    states.back().state_seq = static_cast<std::uint64_t>(i + 1);
+    // Between the first second and the second one nothing comes for 5 s.
+    states.back().time_ns = kBegin_ns + i * 8'333'333LL + (i < 120 ? 0 : 5'000'000'000LL);
+  }
+  ListedStates record(states);
+  const std::vector<float> samples = rendered(record);
+  const auto loudest = [&](double from_s, double to_s) {
+    const auto part = std::span(samples).subspan(static_cast<std::size_t>(from_s * 48000),
+                                                 static_cast<std::size_t>((to_s - from_s) * 48000));
+    float most = 0;
+    for (const float x : part) most = std::max(most, std::abs(x));
+    return most;
+  };
+  EXPECT_GT(loudest(2.0, 2.9), 0.01F);     // 2 s long the last state counts
+  EXPECT_EQ(loudest(4.2, 5.9), 0.0F);      // then the drill has run down
+  EXPECT_GT(loudest(6.5, 7.0), 0.01F);     // it runs again
+  EXPECT_LT(samples.size(), 48000 * 8.0);  // and ends without waiting
+  EXPECT_EQ(samples.back(), 0.0F);
+}
+
+TEST(OfflineSound, StopsWhenItIsAsked) {
+  ListedStates record(timed_states());
+  const auto sound = render_states(
+      record, {}, [](std::span<const float>) { return Result<void>(); }, [](double done) { return done < 0.5; });
+  ASSERT_FALSE(sound);
+  EXPECT_EQ(sound.error().code, ErrorCode::cancelled);
+}
+
+// Both files of osteon-haptic, from the same ticks.
+TEST(StateRecord, ReadsWhatTheHapticClientWrites) {
+  const test::TempDir temp;
+  haptic::RecordingInfo info;
+  info.author = 7;
+  info.tools = {{"drill-3.2", "chi", 3.2}, {"burr-round-5", "milling", 5.0}};
+  auto file = haptic::RecordFile::create(temp / "a.h5", info);
+  ASSERT_TRUE(file) << file.error().message;
+  haptic::SessionLog log;
+  haptic::DeviceInfo device;
+  ASSERT_TRUE(log.open(temp / "a.csv", device, AuthorId{7}));
+  constexpr int kRows = 9000;  // more than are read at once
+  const auto row = [](int i) {
+    haptic::TickRow row;
+    row.mono_ns = kBegin_ns + 1'000'000LL * i;
+    row.report.state_seq = static_cast<std::uint64_t>(i + 1);
+    row.report.tool = i >= 500;
+    row.report.spindle_rpm = 1000 - i % 100;
+    row.report.cutting.phase = i % 2 ? CuttingPhase::cutting : CuttingPhase::rubbing;
+    row.report.cutting.feed_mm_per_s = 0.25 * (i % 8);
+    row.report.cutting.density_g_cm3 = 1.5;
+    row.report.cutting.engaged = 0.75;
+    row.report.cutting.torque_nmm = 16 + i % 4;
+    row.report.coupling.force_n = {3.0, 4.0, 0.0};
+    row.report.pose_bone_proxy.position_mm = {1, 2, 3};
+    if (i >= 100) row.reading.buttons = haptic::kSuction;
+    return row;
+  };
+  for (int i = 0; i < kRows; ++i) {
+    const haptic::TickRow one = row(i);
+    ASSERT_TRUE(file->append({&one, 1}));
+    log.write(one, info.tools[static_cast<std::size_t>(one.report.tool)].name);
+  }
+  ASSERT_TRUE(file->finish({}));
+  ASSERT_TRUE(log.finish());
+
+  for (const char* name : {"a.h5", "a.csv"}) {
+    SCOPED_TRACE(name);
+    const auto record = open_states(temp / name);
+    ASSERT_TRUE(record) << record.error().message;
+    for (int i = 0; i < kRows; ++i) {
+      const auto state = (*record)->next();
+      ASSERT_TRUE(state) << state.error().message;
+      ASSERT_TRUE(*state) << i;
+      const haptic::TickRow expected = row(i);
+      ASSERT_EQ((*state)->time_ns, expected.mono_ns);
+      ASSERT_EQ((*state)->author, AuthorId{7});
+      ASSERT_EQ((*state)->state_seq, expected.report.state_seq);
+      ASSERT_EQ((*state)->tool_name, i >= 500 ? "burr-round-5" : "drill-3.2");
+      ASSERT_EQ((*state)->phase, expected.report.cutting.phase);
+      ASSERT_EQ((*state)->spindle_rpm, expected.report.spindle_rpm);
+      ASSERT_EQ((*state)->feed_mm_per_s, expected.report.cutting.feed_mm_per_s);
+      ASSERT_EQ((*state)->density_g_cm3, 1.5);
+      ASSERT_EQ((*state)->torque_Nmm, expected.report.cutting.torque_nmm);
+      ASSERT_EQ((*state)->force_physical_N.norm(), 5.0);
+      ASSERT_EQ((*state)->pose_bone_tool.position_mm, Vec3(1, 2, 3));
+      ASSERT_EQ((*state)->suction, i >= 100);
+    }
+    const auto end = (*record)->next();
+    ASSERT_TRUE(end);
+    EXPECT_FALSE(*end);
+    EXPECT_EQ((*record)->done(), 1.0);
+  }
+}
+
+constexpr const char* kHeader =
+    "mono_ns,phase,tool,rpm,feed_mm_per_s,density_g_cm3,force_physical_n,torque_nmm,author\n";
+
+// The sentence with which a table is refused.
+std::string refusal(const std::string& text) {
+  const test::TempDir temp;
+  std::ofstream(temp / "log.csv") << text;
+  const auto record = open_states(temp / "log.csv");
+  if (!record) return record.error().message;
+  for (;;) {
+    const auto state = (*record)->next();
+    if (!state) return state.error().message;
+    if (!*state) return {};
+  }
+}
+
+TEST(StateRecord, RefusesABadTableByOneSentence) {
+  const std::string header = kHeader;
+  const std::string good = "1000,free,drill-3.2,900,0,0,0,0,3\n";
+  EXPECT_EQ(refusal(header + good), "");
+  EXPECT_EQ(refusal("\xEF\xBB\xBF" + header + "1000,free,drill-3.2,900,0,0,0,0,3\r\n\n"), "");
+  EXPECT_EQ(refusal(header + good + "2000,free,drill"), "");  // its program was killed
+  EXPECT_THAT(refusal("time_s,rpm\n1,2\n"), AllOf(HasSubstr("line 1"), HasSubstr("mono_ns"), HasSubstr("give")));
+  EXPECT_THAT(refusal(header), HasSubstr("no whole row"));
+  EXPECT_THAT(refusal(header + "1000,free,drill-3.2,fast,0,0,0,0,3\n"),
+              AllOf(HasSubstr("log.csv: line 2: rpm is no number (fast)"), HasSubstr("give")));
+  EXPECT_THAT(refusal(header + "1000,free,drill-3.2,nan,0,0,0,0,3\n"), HasSubstr("line 2: rpm is no number"));
+  EXPECT_THAT(refusal(header + good + "1001,boring,drill-3.2,900,0,0,0,0,3\n"),
+              HasSubstr("line 3: phase is none of idle, free, cutting and rubbing (boring)"));
+  EXPECT_THAT(refusal(header + good + "1001,free,drill-3.2,-5,0,0,0,0,3\n"), HasSubstr("line 3: rpm is -5"));
+  EXPECT_THAT(refusal(header + good + "999,free,drill-3.2,900,0,0,0,0,3\n"),
+              AllOf(HasSubstr("line 3: mono_ns is before"), HasSubstr("sort")));
+  EXPECT_THAT(refusal(header + good + "1001,free,drill-3.2,900\n"), HasSubstr("line 3 has 4 fields"));
+  EXPECT_THAT(refusal(header + good + "9000000000000000000,free,d,900,0,0,0,0,3\n"), HasSubstr("4 hours"));
+  EXPECT_THAT(refusal(header + std::string(20000, 'x') + "\n"), HasSubstr("line 2 has more than"));
+}
+
+TEST(StateRecord, TellsOtherFilesApart) {
+  const test::TempDir temp;
+  const auto message = [&](const char* name) {
+    const auto record = open_states(temp / name);
+    return record ? std::string() : record.error().message;
+  };
+  EXPECT_THAT(message("none.h5"), HasSubstr("there is no file"));
+  std::filesystem::create_directory(temp / "folder");
+  EXPECT_THAT(message("folder"), HasSubstr("is a folder"));
+  std::ofstream(temp / "empty.csv");
+  EXPECT_THAT(message("empty.csv"), HasSubstr("has no byte"));
+  std::ofstream(temp / "room.journal") << "SQLite format 3" << '\0';
+  EXPECT_THAT(message("room.journal"), HasSubstr("keeps cuts but neither forces nor densities"));
+  std::ofstream(temp / "a.h5") << "\x89HDF\r\n\x1a\n and nothing that follows";
+  EXPECT_THAT(message("a.h5"), HasSubstr("a.h5"));
+}
+
+std::string long_log(int rows) {
+  std::string text = kHeader;
+  for (int i = 0; i < rows; ++i)
+    text += std::to_string(kBegin_ns + 8'333'333LL * i) + ",cutting,drill-3.2,1345,0.89,1.9,27,25,1\n";
+  return text;
+}
+
+TEST(RenderCommand, WritesTheSoundOfALog) {
+  const test::TempDir temp;
+  ASSERT_TRUE(write_file(temp / "log.csv", long_log(240)));
+  const auto ran = test::run(test::program("osteon-audio"),
+                             {"render", (temp / "log.csv").string(), "--out", (temp / "x.wav").string()});
+  ASSERT_EQ(ran.exit_code, 0) << ran.err;
+  EXPECT_THAT(ran.out, AllOf(HasSubstr("states     240"), HasSubstr("times as fast as it sounds")));
+  const auto sound = sound::read_wav(temp / "x.wav");
+  ASSERT_TRUE(sound) << sound.error().message;
+  // The last state is 239 / 120 s after the first; then the drill runs down within half a second.
+  EXPECT_GT(sound->seconds(), 2.0);
+  EXPECT_LT(sound->seconds(), 3.0);
+  const auto record = open_states(temp / "log.csv");
+  ASSERT_TRUE(record);
+  const std::vector<float> expected = rendered(**record);
+  ASSERT_EQ(sound->samples.size(), expected.size());
+  for (std::size_t i = 0; i < expected.size(); i += 7) ASSERT_NEAR(sound->samples[i], expected[i], 1.1 / 32768) << i;
+}
+
+TEST(RenderCommand, RefusesToLoseTheRecord) {
+  const test::TempDir temp;
+  ASSERT_TRUE(write_file(temp / "log.csv", long_log(10)));
+  const std::string file = (temp / "log.csv").string();
+  const auto ran = test::run(test::program("osteon-audio"), {"render", file, "--out", file});
+  EXPECT_EQ(ran.exit_code, 1);
+  EXPECT_THAT(ran.err, HasSubstr("would lose what is read"));
+  EXPECT_EQ(*read_file(temp / "log.csv"), long_log(10));
+}
+
+TEST(RenderCommand, LeavesNoPartOfASoundWhenItIsStopped) {
+  const test::TempDir temp;
+  ASSERT_TRUE(write_file(temp / "log.csv", long_log(120 * 1800)));
+  test::Process audio(test::program("osteon-audio"),
+                      {"render", (temp / "log.csv").string(), "--out", (temp / "x.wav").string()});
+  ASSERT_TRUE(audio.wait_for_percent(1, 60s)) << audio.err();
+  audio.signal(SIGINT);
+  EXPECT_EQ(audio.wait(30s), 130);
+  EXPECT_THAT(audio.err(), HasSubstr("stopped"));
+  for (const auto& entry : std::filesystem::directory_iterator(temp.path()))
+    EXPECT_EQ(entry.path().filename(), "log.csv");
+}
+
+}  // namespace
+}  // namespace osteon::audio
