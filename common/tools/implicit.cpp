@@ -14,6 +14,9 @@ namespace {
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kSameCorner_mm = 1e-6;
 
+// std::hypot takes twice as long, and its last bit depends on the C library. No tool is large enough to overflow this.
+double length_mm(double x, double y) { return std::sqrt(x * x + y * y); }
+
 // An edge of a flat convex polygon, counter-clockwise.
 struct PolygonEdge {
   Vec3 from, along, out;  // `out` points out of the polygon, in its plane
@@ -52,9 +55,9 @@ Implicit ball(const Vec3& centre_mm, double radius_mm) {
 
 Implicit cylinder(double radius_mm, double bottom_mm, double top_mm) {
   return {[=](const Vec3& p) {
-            const double dr = std::hypot(p.x(), p.y()) - radius_mm;
+            const double dr = length_mm(p.x(), p.y()) - radius_mm;
             const double dz = std::max(p.z() - top_mm, bottom_mm - p.z());
-            return dr <= 0.0 || dz <= 0.0 ? std::max(dr, dz) : std::hypot(dr, dz);
+            return dr <= 0.0 || dz <= 0.0 ? std::max(dr, dz) : length_mm(dr, dz);
           },
           {Vec3(-radius_mm, -radius_mm, bottom_mm), Vec3(radius_mm, radius_mm, top_mm)}};
 }
@@ -81,11 +84,11 @@ Implicit turned(std::vector<Corner> outline) {
     bounds.include({-a.r, -a.r, a.z});
     // An edge on the axis is inside the solid.
     if (a.r == 0.0 && b.r == 0.0) continue;
-    const double length = std::hypot(b.r - a.r, b.z - a.z);
+    const double length = length_mm(b.r - a.r, b.z - a.z);
     edges.push_back({a, {(b.r - a.r) / length, (b.z - a.z) / length}, length});
   }
   return {[edges = std::move(edges)](const Vec3& p) {
-            const double r = std::hypot(p.x(), p.y());
+            const double r = length_mm(p.x(), p.y());
             double inside = -kInfinity, squared = kInfinity;
             for (const Edge& edge : edges) {
               const double dr = r - edge.from.r, dz = p.z() - edge.from.z;

@@ -131,7 +131,7 @@ Implicit thread(const Tool& tool) {
   const double slower = 1.0 / std::sqrt(1.0 + shift * shift);
   const Implicit within = turned(pointed(crest, point_height_mm(tool) * crest / core, tool.cutting_length_mm));
   const auto distance = [=](const Vec3& p) {
-    const double r = std::hypot(p.x(), p.y());
+    const double r = std::sqrt(p.x() * p.x() + p.y() * p.y());
     const double turn = p.z() / pitch - std::atan2(p.y(), p.x()) / (2.0 * pi);
     const double u = std::abs(turn - std::round(turn)) * pitch;
     // The flank from the foot (half_foot, root) to the crest (0, crest). Below the root there is only the core.
