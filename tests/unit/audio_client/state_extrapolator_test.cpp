@@ -120,7 +120,8 @@ class ContinuedState : public testing::Test {
  protected:
   // A state of the next period, which arrives at once. Returns it as it came.
   ToolSound take(double force_N, CuttingPhase phase = CuttingPhase::cutting, std::uint32_t blows = 0) {
-    ToolSound tool = even_drill(++seq_, static_cast<std::int64_t>(seq_) * kPeriod_ns, kMs);
+    ++seq_;
+    ToolSound tool = even_drill(seq_, static_cast<std::int64_t>(seq_) * kPeriod_ns, kMs);
     tool.force_N = force_N;
     tool.phase = phase;
     tool.blows = blows;

@@ -24,7 +24,7 @@ TEST(ToolStateLink, BlowsSurviveLoss) {
   int behind_ms = 0, most_ms = 0;
   for (int i = 0; i < 4000; i += 4) {
     ++state.state_seq;
-    state.time_ns = i * 1'000'000;
+    state.time_ns = std::int64_t{i} * 1'000'000;
     if (i % 100 == 0 && i < 3500) ++state.blows;
     pair.client.set_state(state, 0);
     pair.run(4ms);
@@ -49,7 +49,7 @@ TEST(ToolStateLink, AtTheBoneEachStateHasItsEffort) {
   int states = 0;
   for (int i = 0; i < 500; ++i) {
     ++state.state_seq;
-    state.time_ns = i * 4'000'000;
+    state.time_ns = std::int64_t{i} * 4'000'000;
     state.force_physical_N = {0, 0, 0.004 * i};
     state.pose_bone_tool.position_mm.z() = state.pose_bone_device.position_mm.z() = 0.1 * i;
     pair.client.set_state(state, 0);
