@@ -19,7 +19,7 @@ struct SynthParams {
   std::uint64_t seed = 1;
   VoiceParams voice;
   SuctionParams suction;
-  Space space;
+  Space space{};
 };
 
 class DrillSynth {
