@@ -30,11 +30,10 @@ Result<std::string> run_devices() {
 }  // namespace
 
 void add_devices_command(CLI::App& app, std::function<Result<std::string>()>& chosen) {
-  CLI::App* command = app.add_subcommand(
-      "devices", "List the sinks of the sound server, by number and name; a star marks the default one");
-  command->footer(
-      "RtAudio tells no more of a sink: not its latency, nor whether anything is plugged in. Numbers change when sinks "
-      "come and go; names stay.");
+  CLI::App* command =
+      app.add_subcommand("devices",
+                         "List the sinks of the sound server: number, channels, rate and name, with a star at the "
+                         "default one. RtAudio tells no latency, nor whether anything is plugged in");
   command->callback([&chosen] { chosen = run_devices; });
 }
 

@@ -30,7 +30,7 @@ struct OutputParams {
   unsigned rate_hz = 48000;
   unsigned frames = 256;  // in one buffer
   unsigned buffers = 4;   // ahead of the sound card; two left rare audible gaps on PulseAudio
-  std::string device;     // name of a sink, or its number in output_devices(); empty: the default one
+  std::string device{};   // name of a sink, or its number in output_devices(); empty: the default one
 };
 
 class AudioOutput {

@@ -28,7 +28,11 @@ struct Separated {
 class Separator {
  public:
   explicit Separator(double rate_hz)
-      : fft_(kTransform), response_(fft_.bins()), minimum_(fft_.bins()), time_(kTransform), rate_hz_(rate_hz) {}
+      : fft_(kTransform), response_(fft_.bins()), minimum_(fft_.bins()), time_(kTransform), band_(fft_.bins()) {
+    for (std::size_t k = 0; k < band_.size(); ++k)
+      band_[k] =
+          static_cast<float>(std::exp(-std::pow(static_cast<double>(k) * rate_hz / kTransform / kDelayBand_hz, 4)));
+  }
 
   // The folded cepstrum of the magnitudes gives the minimum phase (Oppenheim 1989). The delay is where the
   // response and its own minimum-phase form are most alike.
@@ -62,10 +66,7 @@ class Separator {
  private:
   // The maximum of the correlation below kDelayBand_hz, on the parabola through three frames.
   double delay() {
-    for (std::size_t k = 0; k < response_.size(); ++k) {
-      const double ratio = static_cast<double>(k) * rate_hz_ / kTransform / kDelayBand_hz;
-      response_[k] *= std::conj(minimum_[k]) * static_cast<float>(std::exp(-std::pow(ratio, 4)));
-    }
+    for (std::size_t k = 0; k < response_.size(); ++k) response_[k] *= std::conj(minimum_[k]) * band_[k];
     fft_.inverse(response_, time_);
     const auto peak = std::max_element(time_.begin(), time_.begin() + kTransform / 2) - time_.begin();
     const auto at = [&](std::ptrdiff_t n) {
@@ -78,8 +79,7 @@ class Separator {
 
   sound::RealFft fft_;
   std::vector<std::complex<float>> response_, minimum_;
-  std::vector<float> time_;
-  double rate_hz_;
+  std::vector<float> time_, band_;
 };
 
 struct Measurement {
@@ -98,8 +98,8 @@ void add(EarResponse& sum, const EarResponse& part, double weight) noexcept {
   sum.delay_s += weight * part.delay_s;
 }
 
-// The mean of the nearest measurements, with weights of the inverse square of the distance: of a measured direction,
-// that measurement. Those that are as near as the third count too, so that a symmetric head stays symmetric.
+// The mean of the nearest measurements, with weights of the inverse fourth power of the distance: of a measured
+// direction, that measurement. Those that are as near as the third count too, so that a symmetric head stays symmetric.
 EarPair interpolated(const std::vector<Measurement>& measured, const Vec3& direction, double rate_hz) {
   std::vector<double> apart(measured.size());
   for (std::size_t m = 0; m < measured.size(); ++m) apart[m] = (measured[m].towards - direction).squaredNorm();
@@ -108,7 +108,7 @@ EarPair interpolated(const std::vector<Measurement>& measured, const Vec3& direc
   const double reach = kAsNear * sorted[kNeighbours - 1];
   double all = 0;
   for (double& one : apart) {
-    one = one <= reach ? 1.0 / (one + 1e-10) : 0.0;
+    one = one <= reach ? 1.0 / (one * one + 1e-16) : 0.0;
     all += one;
   }
   EarPair ears;

@@ -21,7 +21,7 @@ struct SynthParams {
   std::uint64_t seed = 1;
   VoiceParams voice;
   SuctionParams suction;
-  Space space;
+  Space space{};
   std::vector<ToolModel> presets;  // the user's; they go before those that come with Osteon
 };
 

@@ -49,12 +49,14 @@ int main() {
     std::fprintf(stderr, "osteon-sound-bench: %s\n", hrtf.error().message.c_str());
     return 1;
   }
-  audio::Space space;
+  audio::SynthParams params;
+  params.rate_hz = test::kRate_hz;
+  audio::Space& space = params.space;
   space.listening = audio::Listening::headphones;
   space.pose_bone_head = audio::looking(audio::usual_listener_mm(space.listening), Vec3::Zero(), -Vec3::UnitY());
   space.hrtf = std::make_shared<const audio::Hrtf>(std::move(*hrtf));
   audio::DrillSynth synth;
-  synth.prepare({.rate_hz = test::kRate_hz, .space = space});
+  synth.prepare(params);
   const test::ScriptedDrilling script = test::scripted_drilling();
   for (const bool moving : {false, true})
     std::printf("%s %.1f times as fast\n", moving ? "moving" : "still", speed(synth, script.states, moving));

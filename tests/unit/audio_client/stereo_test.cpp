@@ -62,9 +62,17 @@ Sides played(DrillSynth& synth, const std::vector<ToolSound>& tools, double seco
   return sides;
 }
 
+SynthParams params_in(Listening way) {
+  SynthParams params;
+  params.rate_hz = kRate_hz;
+  params.seed = 3;
+  params.space = usual_space(way);
+  return params;
+}
+
 DrillSynth synth_in(Listening way) {
   DrillSynth synth;
-  synth.prepare({.rate_hz = kRate_hz, .seed = 3, .space = usual_space(way)});
+  synth.prepare(params_in(way));
   return synth;
 }
 
@@ -143,7 +151,7 @@ TEST_P(StereoSynth, OneChannelIsTheMeanOfBoth) {
 
 // On the sound card's thread, with a tool that turns round the listener, and one that comes and goes.
 TEST_P(StereoSynth, TheEngineDoesNotAllocate) {
-  SoundEngine engine({.rate_hz = kRate_hz, .space = usual_space(GetParam())});
+  SoundEngine engine(params_in(GetParam()));
   std::vector<float> left(256), right(256);
   const test::AllocationCounter heap;
   for (int i = 0; i < 400; ++i) {
@@ -168,7 +176,7 @@ TEST_P(StereoSynth, TheEngineDoesNotAllocate) {
 // The way of the sound is in what the engine states: half a metre takes 1.46 ms.
 TEST(StereoEngine, StatedLatencyHasTheWayToTheListener) {
   for (const Listening way : {Listening::mono, Listening::loudspeakers, Listening::headphones}) {
-    SoundEngine engine({.rate_hz = kRate_hz, .space = usual_space(way)});
+    SoundEngine engine(params_in(way));
     std::vector<float> left(4096), right(4096);
     engine.deliver(scene({tool_at(Vec3::Zero(), 1, test::free_drill(1400))}));
     engine.render(left, right);
