@@ -25,6 +25,7 @@ constexpr std::size_t kRecordedLines = 48;
 constexpr double kLineRange_db = 50.0, kQuietestLine_db = -90.0;
 constexpr double kSpeedReach = 0.03;                         // the speed that the user gives may be wrong by so much
 constexpr double kLineReach = 0.01;                          // of a gear's line, within which a line is the gear's
+constexpr double kLineWidth = 0.004;                         // of a line, on both sides of it
 constexpr double kSlowest = 0.9;                             // of the free speed, in bone
 constexpr double kRingRange_db = 40.0, kLeastFall_db = 1.0;  // of a mode, below the loudest, and while it rings
 constexpr double kChanging_s = 0.3;
