@@ -231,8 +231,9 @@ void read_transients(MapReader& in, ToolModel& model) {
   const auto longest = static_cast<std::size_t>(sound::kLongestTransient_s * kPresetTransientRate_hz);
   std::size_t all = 0;
   for (const YAML::Node& entry : *node) {
-    const auto bytes = in.text_of(entry, "transients").empty() ? YAML::Binary() : entry.as<YAML::Binary>();
-    if (bytes.size() < 2 || bytes.size() % 2 != 0 || bytes.size() / 2 > longest)
+    YAML::Binary bytes;
+    const bool decoded = entry.IsScalar() && YAML::convert<YAML::Binary>::decode(entry, bytes);
+    if (!decoded || bytes.size() < 2 || bytes.size() % 2 != 0 || bytes.size() / 2 > longest)
       throw PresetFault{in.where("transients") + "must hold 1 to " + std::to_string(longest) +
                         " samples of 16 bits each, which is 20 ms; shorten it"};
     std::vector<float> samples(bytes.size() / 2);

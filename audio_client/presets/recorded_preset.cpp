@@ -20,11 +20,12 @@ namespace {
 using sound::DrillingState;
 
 constexpr int kRate_hz = kPresetTransientRate_hz;
-constexpr double kLowest_hz = 60.0, kHighest_hz = 10000.0;
+constexpr double kLowest_hz = 60.0, kLowestNoise_hz = 90.0, kHighest_hz = 10000.0;
 constexpr std::size_t kRecordedLines = 48;
 constexpr double kLineRange_db = 50.0, kQuietestLine_db = -90.0;
 constexpr double kSpeedReach = 0.03;                         // the speed that the user gives may be wrong by so much
 constexpr double kLineReach = 0.01;                          // of a gear's line, within which a line is the gear's
+constexpr double kLineWidth = 0.004;                         // of a line, on both sides of it
 constexpr double kSlowest = 0.9;                             // of the free speed, in bone
 constexpr double kRingRange_db = 40.0, kLeastFall_db = 1.0;  // of a mode, below the loudest, and while it rings
 constexpr double kChanging_s = 0.3;
@@ -143,18 +144,28 @@ double fitted_rpm(const std::vector<FoundPeak>& lines, const std::vector<SourceO
   return best_rpm;
 }
 
-std::vector<NoisePoint> noise_of(std::span<const float> residual) {
-  const sound::Spectrum spectrum = sound::power_spectrum(residual, kRate_hz, 2048);
+// The median of the bins round a point: lines are in few of them.
+std::vector<NoisePoint> noise_of(std::span<const float> samples) {
+  const sound::Spectrum spectrum = sound::power_spectrum(samples, kRate_hz);
   std::vector<NoisePoint> points;
-  const double ratio = std::pow(kHighest_hz / 90.0, 1.0 / (kMostNoisePoints - 1));
+  const double ratio = std::pow(kHighest_hz / kLowestNoise_hz, 1.0 / (kMostNoisePoints - 1));
   for (std::size_t i = 0; i < kMostNoisePoints; ++i) {
-    const double hz = 90.0 * std::pow(ratio, static_cast<double>(i)), low = hz / std::sqrt(ratio),
-                 high = hz * std::sqrt(ratio);
-    // At least three bins, so that a band has some.
-    const double least = 1.5 * spectrum.bin_hz, from = std::min(low, hz - least), to = std::max(high, hz + least);
-    points.push_back({hz, std::clamp(sound::band_db(spectrum, from, to) - sound::power_db(to - from), -200.0, 0.0)});
+    const double hz = kLowestNoise_hz * std::pow(ratio, static_cast<double>(i));
+    const auto first = static_cast<std::ptrdiff_t>(hz / std::sqrt(ratio) / spectrum.bin_hz);
+    const auto last = static_cast<std::ptrdiff_t>(hz * std::sqrt(ratio) / spectrum.bin_hz) + 1;
+    std::vector<double> bins(spectrum.power.begin() + first, spectrum.power.begin() + last);
+    const auto middle = bins.begin() + static_cast<std::ptrdiff_t>(bins.size() / 2);
+    std::ranges::nth_element(bins, middle);
+    points.push_back({hz, std::clamp(sound::power_db(*middle / spectrum.bin_hz), -200.0, 0.0)});
   }
   return points;
+}
+
+// Mean difference of the densities.
+double difference_db(const std::vector<NoisePoint>& a, const std::vector<NoisePoint>& b) {
+  double sum = 0;
+  for (std::size_t i = 0; i < a.size(); ++i) sum += a[i].db_per_hz - b[i].db_per_hz;
+  return sum / static_cast<double>(a.size());
 }
 
 // By what the load has slowed the tool: the ratio at which the cut's spectrum has most at the free tool's lines.
@@ -207,10 +218,6 @@ Result<RecordedPreset> turning(std::span<const float> x, const ToolModel& base, 
   sound::SpectralParams spectral;
   spectral.partials.peaks.refinements = params.refinements;
   const sound::SpectralAnalysis analysis = sound::spectral_analysis(x, kRate_hz, spectral);
-  // Short partials sound like noise, and are kept as that.
-  std::vector<float> noise(x.begin(), x.end());
-  for (std::size_t i = 0; i < noise.size(); ++i) noise[i] -= analysis.kept_sines[i];
-
   const std::vector<FoundPeak> found = lines_of(part_of(analysis.kept_sines, *free));
   const std::vector<SourceOrder> orders = source_orders(base);
   model.rated_rpm = base.geared ? fitted_rpm(found, orders, rpm) : rpm;
@@ -228,7 +235,7 @@ Result<RecordedPreset> turning(std::span<const float> x, const ToolModel& base, 
   made.text += said("lines      %zu, and %zu of them of a known source\n", model.lines.size(), known);
   for (const Line& line : base.lines)  // heard only in bone, so they are not in the free part
     if (line.source == LineSource::teeth && model.lines.size() < kMostLines) model.lines.push_back(line);
-  model.noise = noise_of(part_of(noise, *free));
+  model.noise = noise_of(part_of(x, *free));
   made.text += said("noise      %zu points, %.0f to %.0f Hz\n", model.noise.size(), model.noise.front().hz,
                     model.noise.back().hz);
   for (auto [state, material] :
@@ -237,7 +244,7 @@ Result<RecordedPreset> turning(std::span<const float> x, const ToolModel& base, 
     if (!cut || cut->from_s == free->from_s || cut->to_s - cut->from_s < 0.1) continue;
     learn_material(*material, model, sound::power_spectrum(part_of(x, *free), kRate_hz),
                    sound::power_spectrum(part_of(x, *cut), kRate_hz),
-                   sound::rms_db(part_of(noise, *cut)) - sound::rms_db(part_of(noise, *free)));
+                   difference_db(noise_of(part_of(x, *cut)), model.noise));
     made.text += said("%-10s %.2f to %.2f s\n", std::string(sound::name(state)).c_str(), cut->from_s, cut->to_s);
   }
   return made;

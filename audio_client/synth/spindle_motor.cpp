@@ -18,6 +18,7 @@ constexpr double kLoaded_s = 0.05;
 void SpindleMotor::start(const SpindleParams& params, double run_down_s) noexcept {
   *this = SpindleMotor{};
   params_ = params;
+  span_rpm_ = params.full_rpm;
   run_down_s_ = run_down_s;
 }
 

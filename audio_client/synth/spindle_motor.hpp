@@ -21,7 +21,7 @@ class SpindleMotor {
   double run_down_s_ = 0.45;
   Spindle spindle_;
   double command_rpm_ = 0, torque_Nmm_ = 0;
-  double span_rpm_ = 0;  // the highest command of this run: determines how fast it runs up and down
+  double span_rpm_ = 0;  // rated speed, or a higher one of this run: determines how fast it runs up and down
 };
 
 }  // namespace osteon::audio

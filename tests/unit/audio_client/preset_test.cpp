@@ -70,7 +70,7 @@ TEST(Preset, AWrittenFileGivesTheSameAgain) {
     EXPECT_EQ(again->transients, model.transients);
     ASSERT_EQ(again->lines.size(), model.lines.size());
     for (std::size_t i = 0; i < model.lines.size(); ++i) {
-      EXPECT_NEAR(again->lines[i].order, model.lines[i].order, 1e-5 * model.lines[i].order);
+      EXPECT_NEAR(again->lines[i].order, model.lines[i].order, 1e-5 * std::abs(model.lines[i].order));
       EXPECT_EQ(again->lines[i].source, model.lines[i].source);
     }
   }
@@ -129,12 +129,12 @@ TEST(Preset, DamageAtRandomIsASentenceOrASound) {
   std::mt19937 random(1);
   const auto below = [&](std::size_t n) { return static_cast<std::size_t>(random()) % n; };
   int refused = 0, played = 0;
-  for (int round = 0; round < 600; ++round) {
+  for (int round = 0; round < 200; ++round) {
     const ToolModel& model = builtin_presets()[below(builtin_presets().size())];
     std::string text = to_yaml(model);
     for (std::size_t change = 0; change <= below(3); ++change) {
       const std::size_t at = below(text.size());
-      switch (below(4)) {
+      switch (below(8)) {
         case 0:
           text[at] = static_cast<char>(random());
           break;
@@ -144,8 +144,13 @@ TEST(Preset, DamageAtRandomIsASentenceOrASound) {
         case 2:
           text.insert(at, std::string("0123456789-.e{}[]:&*!")[below(21)] + std::string());
           break;
-        default:
+        case 4:
           text.insert(at, text.substr(below(text.size()), below(40)));
+          break;
+        default: {
+          const std::size_t digit = text.find_first_of("0123456789", at);
+          if (digit < text.size()) text[digit] = "0123456789"[below(10)];
+        }
       }
       if (text.empty()) text = "x";
     }
@@ -175,8 +180,8 @@ TEST(Preset, DamageAtRandomIsASentenceOrASound) {
     }
   }
   std::printf("  %d refused, %d played\n", refused, played);
-  EXPECT_GT(refused, 100);
-  EXPECT_GT(played, 50);
+  EXPECT_GT(refused, 40);
+  EXPECT_GT(played, 15);
 }
 
 std::vector<float> play_tool(const ToolModel& model, const ToolSound& tool, double seconds) {

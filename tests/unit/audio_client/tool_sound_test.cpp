@@ -168,12 +168,16 @@ TEST(SpindleMotor, FollowsTheSpindleThroughLoadStallAndRecovery) {
     if (ms % 8 == 0) motor.aim(truth.rpm, torque);
     motor.step(0.001);
     worst_rpm = std::max(worst_rpm, std::abs(motor.rpm() - truth.rpm));
-    if (ms == 1400) EXPECT_NEAR(motor.rpm(), 1400 - 0.7 * 100, 2.0);
+    if (ms == 1400) {
+      EXPECT_NEAR(motor.rpm(), 1400 - 0.7 * 100, 2.0);
+    }
     if (ms == 1950) {
       EXPECT_EQ(motor.rpm(), 0.0);
       EXPECT_TRUE(motor.stalled());
     }
-    if (ms == 2450) EXPECT_NEAR(motor.rpm(), 1400 - 0.7 * 20, 2.0) << "it has recovered";
+    if (ms == 2450) {
+      EXPECT_NEAR(motor.rpm(), 1400 - 0.7 * 20, 2.0) << "it has recovered";
+    }
   }
   EXPECT_TRUE(stalled);
   std::printf("  largest difference of the speeds %.0f rpm\n", worst_rpm);
