@@ -29,12 +29,13 @@ struct Heard {
   double power = 0;
 };
 
-Heard heard(std::span<const std::complex<float>> bins, double scale) {
+Heard heard(std::span<const std::complex<float>> bins, double scale, double faster) {
   Heard frame;
   for (const auto& bin : bins) frame.power += 2.0 * scale * static_cast<double>(std::norm(bin));
   for (int band = 0; band < kBands; ++band) {
-    const auto from = static_cast<std::size_t>(std::ceil(band_edge_hz(band) / kBin_hz));
-    const auto to = std::min(bins.size(), static_cast<std::size_t>(std::ceil(band_edge_hz(band + 1) / kBin_hz)));
+    const auto from = static_cast<std::size_t>(std::ceil(faster * band_edge_hz(band) / kBin_hz));
+    const auto to =
+        std::min(bins.size(), static_cast<std::size_t>(std::ceil(faster * band_edge_hz(band + 1) / kBin_hz)));
     double sum = 0, most = 0;
     for (std::size_t k = from; k < to; ++k) {
       const double power = 2.0 * scale * static_cast<double>(std::norm(bins[k]));
@@ -72,11 +73,11 @@ Eigen::RowVectorXd spectrum_row(const Heard& before, const Heard& now, const Hea
 
 }  // namespace
 
-Eigen::MatrixXd features(std::span<const float> samples, Hearing hearing) {
+Eigen::MatrixXd features(std::span<const float> samples, Hearing hearing, double faster) {
   std::vector<Heard> frames;
   const double scale = sound::power_scale(kFrames);
   sound::for_each_frame(samples, kFrames, [&](std::size_t, std::span<const std::complex<float>> bins) {
-    frames.push_back(heard(bins, scale));
+    frames.push_back(heard(bins, scale, faster));
   });
   const auto count = std::ssize(frames);
   const auto at = [&](std::ptrdiff_t m) -> const Heard& {

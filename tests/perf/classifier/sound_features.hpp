@@ -15,8 +15,9 @@ enum class Hearing : std::uint8_t {
   level_only,  // the level of the window, dB
 };
 
-// A row for each frame. Frame m has its middle at m * kFrameStep_s. Samples at 48 kHz.
-[[nodiscard]] Eigen::MatrixXd features(std::span<const float> samples, Hearing hearing);
+// A row for each frame. Frame m has its middle at m * kFrameStep_s. Samples at 48 kHz. `faster`: all bands are so much
+// higher, as if the sound were played slower.
+[[nodiscard]] Eigen::MatrixXd features(std::span<const float> samples, Hearing hearing, double faster = 1.0);
 
 // The samples with white noise, whose power is that of the sound in [from_s, to_s) less `snr_db`.
 [[nodiscard]] std::vector<float> with_noise(std::span<const float> samples, double from_s, double to_s, double snr_db,

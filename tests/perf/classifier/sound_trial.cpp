@@ -6,6 +6,7 @@
 
 #include "audio_client/offline/offline_sound.hpp"
 #include "common/core/check.hpp"
+#include "common/sound/random.hpp"
 #include "common/tools/tool.hpp"
 #include "tests/perf/classifier/gaussian_hmm.hpp"
 
@@ -15,6 +16,8 @@ namespace {
 constexpr double kUsualRpm = 1000;
 constexpr double kUsualDiameter_mm = 3.2;
 constexpr int kNear = static_cast<int>(0.05 / kFrameStep_s + 0.5);  // frames
+constexpr int kHearings = 5;
+constexpr double kMostFaster = 0.15;
 // Seeds of what is trained on and of what is tested never meet.
 constexpr std::uint64_t kTestSeeds = 1000, kNoiseSeeds = 1'000'000;
 
@@ -36,9 +39,9 @@ class DrilledRecord final : public audio::StateRecord {
   std::size_t next_ = 0;
 };
 
-LabelledFrames heard(const Sounding& s, Hearing hearing, double snr_db, std::uint64_t seed) {
+LabelledFrames heard(const Sounding& s, Hearing hearing, double snr_db, std::uint64_t seed, double faster = 1.0) {
   LabelledFrames frames;
-  frames.rows = features(with_noise(s.samples, s.from_s, s.to_s, snr_db, seed), hearing);
+  frames.rows = features(with_noise(s.samples, s.from_s, s.to_s, snr_db, seed), hearing, faster);
   frames.classes = s.classes;
   return frames;
 }
@@ -156,7 +159,12 @@ std::vector<TrialResult> trial(const std::vector<Sounding>& training, const std:
                                Hearing hearing, double snr_db) {
   std::vector<LabelledFrames> lessons;
   std::uint64_t seed = kNoiseSeeds;
-  for (const Sounding& s : training) lessons.push_back(heard(s, hearing, snr_db, ++seed));
+  // The speed of training is one. So that its lines are not taken for the only possible ones, each sound is also heard
+  // as if it were slower and faster.
+  sound::Random random(seed);
+  for (const Sounding& s : training)
+    for (int i = 0; i < kHearings; ++i)
+      lessons.push_back(heard(s, hearing, snr_db, ++seed, 1.0 + kMostFaster * (2.0 * random.unit() - 1.0)));
   const GaussianHmm model = GaussianHmm::learned(lessons, static_cast<int>(kSoundClasses), {});
   std::vector<TrialResult> results;
   for (const std::vector<Sounding>& set : tests) {
