@@ -81,8 +81,8 @@ TEST(SoundEngine, ALoadThatRisesGoesOnForAPeriod) {
     SoundEngine engine(SynthParams{});
     const std::int64_t now_ns = std::chrono::steady_clock::now().time_since_epoch().count();
     for (const CuttingState& state : states) engine.deliver(scene_of(state, now_ns - kPast_ns + state.time_ns));
-    std::vector<float> frames(48000);
-    for (std::size_t at = 0; at < frames.size(); at += 240) engine.render(std::span(frames).subspan(at, 240));
+    std::vector<float> frames(48000), right(240);
+    for (std::size_t at = 0; at < frames.size(); at += 240) engine.render(std::span(frames).subspan(at, 240), right);
     return sound::rms_db(std::span(frames).last(24000));
   };
   const double went_on = level_db({state_of(1, true), state_of(2, true)});

@@ -105,8 +105,7 @@ struct Called {
   bool answered = false;  // a message was received
 };
 
-// Any call: one request, then the first answer, a message or the end. The request goes out as a client's unary call
-// does, in one piece. Otherwise a proxy may learn that the server needs no request before it has passed on the answer.
+// One request in one piece, because a proxy may end what comes after the answer. Then the first answer: message or end.
 Called call(const std::shared_ptr<grpc::Channel>& channel, const std::string& method, const ByteBuffer& request,
             const std::map<std::string, std::string>& metadata) {
   grpc::GenericStub stub(channel);
