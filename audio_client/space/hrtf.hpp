@@ -16,7 +16,7 @@ struct HeadResponse {
   std::vector<float> left, right;
 };
 
-inline constexpr int kEarTaps = 128;  // 2.7 ms at 48 kHz; in KEMAR's ears 1 % of the energy comes later
+inline constexpr int kEarTaps = 96;  // 2 ms at 48 kHz; in KEMAR's ears 1 % of the energy comes later
 using EarFilter = std::array<float, kEarTaps>;
 
 struct EarResponse {
