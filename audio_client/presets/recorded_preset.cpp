@@ -20,7 +20,9 @@ namespace {
 using sound::DrillingState;
 
 constexpr int kRate_hz = kPresetTransientRate_hz;
-constexpr double kLowest_hz = 60.0, kLowestNoise_hz = 90.0, kHighest_hz = 10000.0;
+constexpr double kLowest_hz = 60.0, kHighest_hz = 10000.0;
+// The band of the last point still ends below 9.9 kHz, which conversion to this rate passes.
+constexpr double kLowestNoise_hz = 90.0, kHighestNoise_hz = 8500.0;
 constexpr std::size_t kRecordedLines = 48;
 constexpr double kLineRange_db = 50.0, kQuietestLine_db = -90.0;
 constexpr double kSpeedReach = 0.03;                         // the speed that the user gives may be wrong by so much
@@ -148,7 +150,7 @@ double fitted_rpm(const std::vector<FoundPeak>& lines, const std::vector<SourceO
 std::vector<NoisePoint> noise_of(std::span<const float> samples) {
   const sound::Spectrum spectrum = sound::power_spectrum(samples, kRate_hz);
   std::vector<NoisePoint> points;
-  const double ratio = std::pow(kHighest_hz / kLowestNoise_hz, 1.0 / (kMostNoisePoints - 1));
+  const double ratio = std::pow(kHighestNoise_hz / kLowestNoise_hz, 1.0 / (kMostNoisePoints - 1));
   for (std::size_t i = 0; i < kMostNoisePoints; ++i) {
     const double hz = kLowestNoise_hz * std::pow(ratio, static_cast<double>(i));
     const auto first = static_cast<std::ptrdiff_t>(hz / std::sqrt(ratio) / spectrum.bin_hz);

@@ -51,12 +51,11 @@ void add_sine(Block& block, double phase_turns, double step_turns, float from, f
   constexpr std::size_t kLanes = 8;
   std::array<float, kLanes> re{}, im{}, amplitude{};
   const float step = (to - from) / kBlockFrames;
-  for (std::size_t l = 0; l < kLanes; ++l) {
-    amplitude[l] = from + static_cast<float>(l) * step;
-  }
-  auto c = static_cast<float>(std::cos(kTurn * step_turns)), s = static_cast<float>(std::sin(kTurn * step_turns));
-  re[0] = static_cast<float>(std::cos(kTurn * phase_turns));
-  im[0] = static_cast<float>(std::sin(kTurn * phase_turns));
+  for (std::size_t l = 0; l < kLanes; ++l) amplitude[l] = from + static_cast<float>(l) * step;
+  const auto turn = static_cast<float>(kTurn * step_turns), begin = static_cast<float>(kTurn * phase_turns);
+  float c = std::cos(turn), s = std::sin(turn);
+  re[0] = std::cos(begin);
+  im[0] = std::sin(begin);
   for (std::size_t l = 1; l < kLanes; ++l) {
     re[l] = re[l - 1] * c - im[l - 1] * s;
     im[l] = re[l - 1] * s + im[l - 1] * c;
