@@ -46,13 +46,14 @@ TEST(ScriptedDrilling, TheEarTellsTheLayersApart) {
   const test::TempDir temp;
   const char* keep = std::getenv("OSTEON_SOUND_DIR");
   const std::filesystem::path file = (keep ? std::filesystem::path(keep) : temp.path()) / "scripted-drilling.wav";
-  auto recorder = WavRecorder::open(file, 48000);
+  auto recorder = WavRecorder::open(file, 48000, 1);
   ASSERT_TRUE(recorder) << recorder.error().message;
-  recorder->push(std::span(samples).first(200000));
+  const auto push = [&](std::span<const float> part) { recorder->push(part, part); };
+  push(std::span(samples).first(200000));
   while (recorder->frames_written() < 200000) std::this_thread::yield();
   for (std::size_t at = 200000; at < samples.size(); at += 100000) {
     const std::size_t count = std::min<std::size_t>(100000, samples.size() - at);
-    recorder->push(std::span(samples).subspan(at, count));
+    push(std::span(samples).subspan(at, count));
     while (recorder->frames_written() < at + count) std::this_thread::yield();
   }
   ASSERT_TRUE(recorder->close());
