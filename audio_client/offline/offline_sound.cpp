@@ -6,6 +6,7 @@
 
 #include "audio_client/output/audio_output.hpp"
 #include "audio_client/synth/sound_scene.hpp"
+#include "audio_client/synth/state_extrapolator.hpp"
 
 namespace osteon::audio {
 namespace {
@@ -36,7 +37,9 @@ class Player {
     const std::int64_t now_ns = start_ns_ + std::llround(1e9 * static_cast<double>(sound.frames) / rate_hz_);
     auto fresh = take_until(now_ns, sound);
     if (!fresh) return tl::unexpected(fresh.error());
+    if (*fresh || states_.moves()) synth_.aim(states_.at(now_ns));
     if (!*fresh && sounding_ && (!next_ || now_ns - newest_ns_ > kStale_ns)) {
+      states_.take(SoundScene{});
       synth_.aim(SoundScene{});
       sounding_ = false;
     }
@@ -48,26 +51,25 @@ class Player {
   }
 
  private:
-  // Aims at the newest state up to a time. False if there is no new one.
+  // Takes the states up to a time. False if there is no new one.
   Result<bool> take_until(std::int64_t now_ns, OfflineSound& sound) {
-    std::optional<CuttingState> newest;
+    bool fresh = false;
     while (next_ && next_->time_ns <= now_ns) {
-      newest = std::move(next_);
+      newest_ns_ = next_->time_ns;
+      states_.take(sound_scene(std::span(&*next_, 1), newest_ns_));
+      fresh = sounding_ = true;
       ++sound.states;
       auto more = record_.next();
       if (!more) return tl::unexpected(more.error());
       next_ = std::move(*more);
     }
-    if (!newest) return false;
-    newest_ns_ = newest->time_ns;
-    synth_.aim(sound_scene(std::span(&*newest, 1), now_ns));
-    sounding_ = true;
-    return true;
+    return fresh;
   }
 
   StateRecord& record_;
   double rate_hz_;
   DrillSynth synth_;
+  StateExtrapolator states_;
   std::optional<CuttingState> next_;
   std::int64_t start_ns_ = 0, newest_ns_ = 0;
   bool sounding_ = false;  // a tool was aimed at, and not yet released

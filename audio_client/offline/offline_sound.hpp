@@ -19,9 +19,9 @@ struct OfflineSound {
 // Takes the next frames, in order.
 using TakeFrames = std::function<Result<void>(std::span<const float> frames)>;
 
-// The sound begins with the first state. Every buffer of the live client's size takes the newest state that is there
-// when the buffer begins. Where no state comes for 2 s, and at the end, the tool runs down as it does live. Errors:
-// those of the record and of `take`, and cancelled.
+// The sound begins with the first state. Every buffer of the live client's size takes the states that are there when
+// the buffer begins, and continues them to then. Where no state comes for 2 s, and at the end, the tool runs down as it
+// does live. Errors: those of the record and of `take`, and cancelled.
 [[nodiscard]] Result<OfflineSound> render_states(StateRecord& record, const SynthParams& params, const TakeFrames& take,
                                                  const KeepGoing& keep_going);
 

@@ -7,9 +7,6 @@
 namespace osteon::audio {
 namespace {
 
-// Read through the vDSO: no system call.
-std::int64_t now_ns() noexcept { return std::chrono::steady_clock::now().time_since_epoch().count(); }
-
 void keep_largest(std::atomic<float>& most, std::span<const float> samples) noexcept {
   float largest = most.load(std::memory_order_relaxed);
   for (const float x : samples) largest = std::max(largest, std::abs(x));
@@ -18,12 +15,16 @@ void keep_largest(std::atomic<float>& most, std::span<const float> samples) noex
 
 }  // namespace
 
-SoundEngine::SoundEngine(const SynthParams& params) : rate_hz_(params.rate_hz), ramp_(params.rate_hz) {
+// Read through the vDSO: no system call.
+std::int64_t SoundEngine::steady_ns() noexcept { return std::chrono::steady_clock::now().time_since_epoch().count(); }
+
+SoundEngine::SoundEngine(const SynthParams& params, Clock now_ns)
+    : now_ns_(now_ns), rate_hz_(params.rate_hz), ramp_(params.rate_hz) {
   synth_.prepare(params);
 }
 
 void SoundEngine::render(std::span<float> left, std::span<float> right) noexcept {
-  const std::int64_t start_ns = now_ns();
+  const std::int64_t start_ns = now_ns_();
   if (frames() == 0) first_frame_ns_.store(start_ns, std::memory_order_relaxed);
   take_scenes(start_ns);
   synth_.process(left, right);
@@ -35,7 +36,7 @@ void SoundEngine::render(std::span<float> left, std::span<float> right) noexcept
   silent_.store(synth_.silent(), std::memory_order_relaxed);
   ramp_.apply(left, right, volume_.load(std::memory_order_relaxed));
   note_played(left, right);
-  const std::int64_t took_ns = now_ns() - start_ns;
+  const std::int64_t took_ns = now_ns_() - start_ns;
   work_.record(std::chrono::nanoseconds(took_ns));
   longest_ns_.store(std::max(longest_ns_.load(std::memory_order_relaxed), took_ns), std::memory_order_relaxed);
 }

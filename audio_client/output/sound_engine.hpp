@@ -33,7 +33,10 @@ class SoundEngine final : public SoundSource {
   static constexpr std::size_t kWave_frames = 512;
   using Wave = std::array<float, kWave_frames>;
 
-  explicit SoundEngine(const SynthParams& params);
+  using Clock = std::int64_t (*)() noexcept;  // ns
+  [[nodiscard]] static std::int64_t steady_ns() noexcept;
+  // `now_ns`: the clock of the scenes' arrival. Tests may have one of their own.
+  explicit SoundEngine(const SynthParams& params, Clock now_ns = &steady_ns);
   // Records from now on, at full volume; call it before the output starts. The recorder must outlive the engine's last
   // render().
   void record_to(WavRecorder& recorder) noexcept { recorder_ = &recorder; }
@@ -84,6 +87,7 @@ class SoundEngine final : public SoundSource {
   void note_sounded(const SoundScene& scene, std::int64_t start_ns) noexcept;
   void note_played(std::span<const float> left, std::span<const float> right) noexcept;
 
+  Clock now_ns_;
   double rate_hz_;
   DrillSynth synth_;
   WavRecorder* recorder_ = nullptr;

@@ -30,12 +30,12 @@ constexpr double kTone_hz = 1000;
 
 struct SteadyTone final : SoundSource {
   std::atomic<std::uint64_t> frames{0};
-  void render(std::span<float> mono) noexcept override {
+  void render(std::span<float> left, std::span<float> right) noexcept override {
     const std::uint64_t at = frames.load();
-    for (std::size_t i = 0; i < mono.size(); ++i)
-      mono[i] =
+    for (std::size_t i = 0; i < left.size(); ++i)
+      left[i] = right[i] =
           static_cast<float>(0.5 * std::cos(2 * std::numbers::pi * kTone_hz * static_cast<double>(at + i) / 48000));
-    frames += mono.size();
+    frames += left.size();
   }
 };
 

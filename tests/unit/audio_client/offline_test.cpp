@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <cmath>
 #include <csignal>
@@ -72,16 +73,19 @@ std::vector<float> rendered(StateRecord& record) {
   return samples;
 }
 
-// What the live program does, with buffers that begin at the first state.
+std::atomic<std::int64_t> clock_ns = 0;
+
+// What the live program does, with buffers that begin at the first state, and a clock that goes from one to the next.
 std::vector<float> live(const std::vector<CuttingState>& states, std::size_t frames) {
-  SoundEngine engine(SynthParams{});
-  std::vector<float> samples(frames);
+  SoundEngine engine(SynthParams{}, []() noexcept -> std::int64_t { return clock_ns; });
+  std::vector<float> samples(frames), right(kBuffer);
   std::size_t next = 0;
   for (std::size_t at = 0; at + kBuffer <= frames; at += kBuffer) {
     const std::int64_t now_ns = kBegin_ns + std::llround(1e9 * static_cast<double>(at) / test::kRate_hz);
     for (; next < states.size() && states[next].time_ns <= now_ns; ++next)
-      engine.deliver(sound_scene(std::span(&states[next], 1), now_ns));
-    engine.render(std::span(samples).subspan(at, kBuffer));
+      engine.deliver(sound_scene(std::span(&states[next], 1), states[next].time_ns));
+    clock_ns = now_ns;
+    engine.render(std::span(samples).subspan(at, kBuffer), right);
   }
   return samples;
 }
