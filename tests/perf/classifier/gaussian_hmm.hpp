@@ -25,7 +25,7 @@ class GaussianHmm {
   // Every class needs a frame.
   static GaussianHmm learned(const std::vector<LabelledFrames>& sequences, int classes, const Params& params);
 
-  // The most probable sequence of classes (Viterbi 1967).
+  // The most probable sequence of classes, by the algorithm of Viterbi.
   [[nodiscard]] std::vector<int> named(const Eigen::MatrixXd& rows) const;
 
  private:

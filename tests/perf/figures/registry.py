@@ -144,7 +144,7 @@ FIGURES = [
     # Silent, free, cortical, cancellous and perforation, told by a classifier that never heard the seed, speed or tool.
     # Smallest and largest: of the sets of other drillings, other speeds and each other tool.
     *[Figure(f"sound_classes_{listener}_{truth}_{snr}db", "share", f"{what} by {heard}, white noise {snr} dB below the "
-             "tool", "sound_classes", (">=", bounds[snr]) if truth == "accuracy" and bounds else None)
+             "tool", "sound_classes", (">=", bounds[snr]) if truth != "transitions" and bounds else None)
       for listener, heard, bounds in SOUND_LISTENERS for truth, what in SOUND_TRUTHS for snr in (20, 6)],
     # Required physics: phantom 5/20/5 mm at 1.9/0.3/1.9 g/cm3, drill 3.2 mm, 1000 rpm.
     Figure("rig_force_cortical_error", "percent", "thrust in the cortical layers at 1 mm/s against Chi's law (28.9 N)",
