@@ -46,6 +46,8 @@ Result<std::optional<CuttingState>> StateRecord::next() {
     return bad_input(place(number->field) + "is " + std::to_string(number->value) +
                      ", which no tool has; the record is damaged, so record the session again");
   const std::int64_t time_ns = (*state)->time_ns;
+  if (time_ns < 0 || time_ns > kLatestState_ns)
+    return bad_input(place("mono_ns") + "is not of a clock; the record is damaged, so record the session again");
   if (!first_ns_) first_ns_ = time_ns;
   if (last_ns_ && time_ns < *last_ns_)
     return bad_input(place("mono_ns") + "is before that of the row before; sort the rows by time");

@@ -72,9 +72,10 @@ void DrillSynth::aim(const SoundScene& scene) noexcept {
       return (v.sounding() || v.waits()) && v.author() == tool.author && v.handpiece() == &handpiece;
     });
     if (same != voices_.end()) {
-      same->aim(tool);
       const auto at = static_cast<std::size_t>(same - voices_.begin());
-      paths_[at].aim(tool.tip_mm);
+      // While nothing sounds, the way does not follow the tool.
+      quiet(at) ? paths_[at].start(tool.tip_mm) : paths_[at].aim(tool.tip_mm);
+      same->aim(tool);
       aimed[at] = true;
       continue;
     }

@@ -16,6 +16,7 @@ struct ToolSound {
   HandpieceKind handpiece = HandpieceKind::geared_drill;
   double rpm = 0;
   double load = 0;           // 0 free; 1 at the cortical reference point of the hand piece; at most 1.5
+  double load_ahead = 0;     // of the load, what no state has said yet: it was computed ahead
   double hardness = 0;       // density under the cutting part / 1.9 g/cm^3, 0 without contact
   double chips = 0;          // chip flow, 0 without cutting; 1 at 1 mm/s through cortical bone; at most 1.5
   bool advancing = false;    // moves into the bone

@@ -127,6 +127,7 @@ ToolSound StateExtrapolator::continued(const Track& track, std::int64_t now_ns) 
       std::min(ahead, static_cast<double>(kForcePeriods * track.period_ns) / static_cast<double>(gap_ns));
   for (const auto& [number, most] : kContinued)
     now.*number = std::clamp(newest.*number + force_ahead * (newest.*number - before.*number), 0.0, most);
+  now.load_ahead = now.load - newest.load;
   return now;
 }
 

@@ -118,22 +118,23 @@ void Voice::aim(const ToolSound& tool) noexcept {
 }
 
 void Voice::release() noexcept {
-  target_.rpm = target_.load = target_.hardness = target_.chips = 0;
+  target_.rpm = target_.load = target_.load_ahead = target_.hardness = target_.chips = 0;
   motor_.aim(0, 0);
   waits_ = false;
 }
 
 // A layer gives way: the load is gone from a tool that advances, or that advanced one state ago and is through. A tool
-// that is drawn back stops first and leaves without a knock.
+// that is drawn back stops first and leaves without a knock. Only what a state has said counts: a load that falls, and
+// that is computed ahead, may stay after all.
 void Voice::break_through(const ToolSound& tool) noexcept {
-  if (!(tool.advancing || target_.advancing) || recent_load_ <= kKnockLoad || tool.load >= kGivesWay * recent_load_)
-    return;
-  const double released = recent_load_ - tool.load;
+  const double load = tool.load - tool.load_ahead;
+  if (!(tool.advancing || target_.advancing) || recent_load_ <= kKnockLoad || load >= kGivesWay * recent_load_) return;
+  const double released = recent_load_ - load;
   const std::vector<Mode>& burst = handpiece_->model.perforation.burst;
   for (std::size_t m = 0; m < burst.size(); ++m)
     burst_.strike(m, burst[m].hz, burst[m].decay_s, released * amplitude_of_db(burst[m].level_db), rate_hz_);
   perforated_ = std::clamp(released, perforated_, 1.0);
-  recent_load_ = tool.load;
+  recent_load_ = load;
 }
 
 void Voice::blow(const ToolSound& tool) noexcept {
@@ -175,7 +176,7 @@ void Voice::advance_controls() noexcept {
   chips_ += k * (target_.chips - chips_);
   if (target_.cortex_mm > 0)
     cortex_mm_ = cortex_mm_ > 0 ? cortex_mm_ + k * (target_.cortex_mm - cortex_mm_) : target_.cortex_mm;
-  recent_load_ = std::max(target_.load, recent_load_ * (1.0 - share(kRecentLoad_s, rate_hz_)));
+  recent_load_ = std::max(target_.load - target_.load_ahead, recent_load_ * (1.0 - share(kRecentLoad_s, rate_hz_)));
   perforated_ *= 1.0 - share(handpiece_->model.perforation.fade_s, rate_hz_);
   gains_ = material_gains(handpiece_->model, load_, hardness_, perforated_);
 }

@@ -158,7 +158,8 @@ v1::UpPacket ClientLink::state_part(Time now) const {
   v1::UpPacket part;
   const Time interval = effort_interval();
   if (state_ && (state_due() <= now || now - said_at_ >= interval))
-    *part.mutable_state() = to_tool_state(state_->state, state_->buttons, now - effort_at_ >= interval);
+    *part.mutable_state() = to_tool_state(state_->state, state_->buttons,
+                                          now - effort_at_ >= interval || state_->state.tool_name != effort_tool_);
   return part;
 }
 
@@ -166,7 +167,10 @@ void ClientLink::said_state(const v1::UpPacket& part, Time now) {
   if (!part.has_state()) return;
   said_ = state_;
   said_at_ = now;
-  if (part.state().has_effort()) effort_at_ = now;
+  if (part.state().has_effort()) {
+    effort_at_ = now;
+    effort_tool_ = state_->state.tool_name;
+  }
   moved_ = false;
 }
 

@@ -112,6 +112,8 @@ class ClientLink {
   std::optional<KnownToolState> state_, said_;  // newest, and last sent
   bool moved_ = false;                          // whether they differ by more than the deadband
   Time said_at_ = -std::chrono::hours(1), effort_at_ = said_at_;
+  // The newest effort's. Blows are counted for each tool, so a count must not come under another tool's name.
+  std::string effort_tool_;
   std::optional<MountLoad> push_;  // newest that was not sent yet
   Time pushed_at_ = -std::chrono::hours(1);
   std::optional<MountPose> bone_;  // newest that was not taken yet

@@ -7,14 +7,19 @@
 #include <algorithm>
 #include <cmath>
 #include <complex>
+#include <cstdint>
+#include <cstring>
 #include <limits>
 #include <numeric>
 #include <string>
+#include <string_view>
+#include <utility>
 #include <vector>
 
 #include "audio_client/space/listener.hpp"
 #include "audio_client/space/sofa_file.hpp"
 #include "common/runtime/files.hpp"
+#include "tests/support/content.hpp"
 #include "tests/support/temp_dir.hpp"
 #include "tests/unit/audio_client/ideal_head.hpp"
 
@@ -181,6 +186,29 @@ TEST(SofaFile, TheDefaultHeadIsSymmetric) {
   const auto hrtf = read_hrtf({}, 48000);
   ASSERT_TRUE(hrtf) << hrtf.error().message;
   expect_symmetric(*hrtf);
+}
+
+// Arrays that are shorter than the numbers beside them say. libmysofa reads such a file without a complaint.
+TEST(SofaFile, NumbersThatAreNotThoseOfTheDataAreRefused) {
+  const test::TempDir temp;
+  const std::string whole = test::content("/usr/share/libmysofa/MIT_KEMAR_normal_pinna.sofa");
+  ASSERT_FALSE(whole.empty());
+  // Every number 710 of 8 bytes could be that of the directions, and every 512 that of the samples.
+  int refused = 0;
+  for (const auto& [number, other] : {std::pair<std::uint64_t, std::uint64_t>{710, 9999}, {512, 1000}}) {
+    const std::string_view was(reinterpret_cast<const char*>(&number), sizeof number);
+    for (std::size_t at = whole.find(was); at != std::string::npos; at = whole.find(was, at + 1)) {
+      std::string damaged = whole;
+      std::memcpy(damaged.data() + at, &other, sizeof other);
+      ASSERT_TRUE(write_file(temp / "damaged.sofa", damaged));
+      const auto read = read_hrtf(temp / "damaged.sofa", 48000);
+      refused += !read;
+      if (!read) {
+        EXPECT_THAT(read.error().message, testing::HasSubstr("damaged.sofa"));
+      }
+    }
+  }
+  EXPECT_GT(refused, 0);
 }
 
 TEST(SofaFile, WhatIsNoHeadIsOneSentence) {

@@ -231,7 +231,9 @@ TEST(StateRecord, RefusesABadTableByOneSentence) {
   EXPECT_THAT(refusal(header + good + "999,free,drill-3.2,900,0,0,0,0,3\n"),
               AllOf(HasSubstr("line 3: mono_ns is before"), HasSubstr("sort")));
   EXPECT_THAT(refusal(header + good + "1001,free,drill-3.2,900\n"), HasSubstr("line 3 has 4 fields"));
-  EXPECT_THAT(refusal(header + good + "9000000000000000000,free,d,900,0,0,0,0,3\n"), HasSubstr("4 hours"));
+  EXPECT_THAT(refusal(header + good + "4000000000000000000,free,d,900,0,0,0,0,3\n"), HasSubstr("4 hours"));
+  for (const char* wild : {"9223372036854775000", "-1000"})
+    EXPECT_THAT(refusal(header + wild + ",free,d,900,0,0,0,0,3\n"), HasSubstr("line 2: mono_ns is not of a clock"));
   EXPECT_THAT(refusal(header + std::string(20000, 'x') + "\n"), HasSubstr("line 2 has more than"));
 }
 

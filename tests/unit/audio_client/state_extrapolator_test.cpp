@@ -7,7 +7,10 @@
 #include <cmath>
 #include <functional>
 #include <map>
+#include <vector>
 
+#include "audio_client/synth/drill_synth.hpp"
+#include "common/sound/tones.hpp"
 #include "tests/support/allocation_counter.hpp"
 #include "tests/support/scenes/random.hpp"
 #include "tests/unit/audio_client/scripted_drilling.hpp"
@@ -40,6 +43,40 @@ ToolSound even_drill(std::uint64_t seq, std::int64_t sent_ns, std::int64_t clock
   state.depth_mm = kSpeed_mm_per_s * t_s;
   state.force_physical_N = {0, 0, kRise_N_per_s * t_s};
   return tool_sound(state);
+}
+
+// A hand that eases off from one state to the next. Computed ahead, the load would be nearly gone.
+TEST(StateExtrapolator, AFallOfTheLoadIsNoBreakthrough) {
+  StateExtrapolator states;
+  const auto pushed = [&](std::uint64_t seq, double share) {
+    ToolSound tool = even_drill(seq, static_cast<std::int64_t>(seq) * kPeriod_ns, 0);
+    tool.load = share;
+    tool.advancing = true;
+    return scene_with(tool, kStart_ns + static_cast<std::int64_t>(seq) * kPeriod_ns);
+  };
+  states.take(pushed(1, 1.0));
+  states.take(pushed(2, 0.55));
+  const ToolSound ahead = states.at(kStart_ns + 3 * kPeriod_ns).tools[0];
+  EXPECT_NEAR(ahead.load, 0.1, 1e-9);
+  EXPECT_NEAR(ahead.load - ahead.load_ahead, 0.55, 1e-9);
+
+  // The burst of a breakthrough rings near 200 Hz. A drill whose load stays has none, and neither has this one.
+  const auto burst_db = [&](const ToolSound& after) {
+    DrillSynth synth;
+    synth.prepare({});
+    SoundScene scene = scene_with(states.at(kStart_ns + 2 * kPeriod_ns).tools[0], 0);
+    scene.tools[0].load = 1.0;
+    std::vector<float> samples(48000), later(4800);
+    synth.aim(scene);
+    synth.process(samples);
+    scene.tools[0] = after;
+    synth.aim(scene);
+    synth.process(later);
+    return sound::tone_db(later, 48000, 200.0);
+  };
+  ToolSound through = ahead;
+  through.load_ahead = 0.0;  // a state has said so
+  EXPECT_GT(burst_db(through), burst_db(ahead) + 10.0);
 }
 
 struct Line {

@@ -139,6 +139,29 @@ TEST_P(StereoSynth, FallsSilentAfterTheLastSoundHasArrived) {
   EXPECT_EQ(sound::peak(std::span(after.right).last(4800)), 0);
 }
 
+// A broach is silent between its blows. Where it was at the last one does not count.
+TEST_P(StereoSynth, ABlowIsHeardWhereTheBroachIsNow) {
+  ToolSound broach = tool_at({0, 0, 300}, 1, test::idle_drill());
+  broach.tool = "broach";
+  const auto blow_at = [&](double z_mm, DrillSynth& synth) {
+    broach.tip_mm = {0, 0, z_mm};
+    ++broach.blows;
+    broach.blow_impulse_N_s = 2.8;
+    return played(synth, {broach}, 3.0);
+  };
+  DrillSynth moved = synth_in(GetParam()), fresh = synth_in(GetParam());
+  static_cast<void>(played(moved, {broach}, 0.1));
+  ASSERT_GT(sound::peak(blow_at(300, moved).left), 0.001);
+  const Sides there = blow_at(-300, moved);
+  broach.blows = 0;
+  broach.tip_mm = {0, 0, -300};
+  static_cast<void>(played(fresh, {broach}, 0.1));
+  const Sides alone = blow_at(-300, fresh);
+  EXPECT_NEAR(sound::rms_db(std::span(there.left).first(4800)), sound::rms_db(std::span(alone.left).first(4800)), 0.5);
+  EXPECT_NEAR(sound::rms_db(std::span(there.right).first(4800)), sound::rms_db(std::span(alone.right).first(4800)),
+              0.5);
+}
+
 TEST_P(StereoSynth, OneChannelIsTheMeanOfBoth) {
   const ToolSound drill = tool_at({10, 20, 90}, 1, test::free_drill(1400));
   DrillSynth synth = synth_in(GetParam()), single = synth_in(GetParam());
