@@ -142,7 +142,7 @@ TEST_P(StereoSynth, FallsSilentAfterTheLastSoundHasArrived) {
 // A broach is silent between its blows. Where it was at the last one does not count.
 TEST_P(StereoSynth, ABlowIsHeardWhereTheBroachIsNow) {
   ToolSound broach = tool_at({0, 0, 300}, 1, test::idle_drill());
-  broach.tool = "broach";
+  broach.tool = "broach-1";
   const auto blow_at = [&](double z_mm, DrillSynth& synth) {
     broach.tip_mm = {0, 0, z_mm};
     ++broach.blows;
