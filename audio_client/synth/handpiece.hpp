@@ -44,7 +44,8 @@ struct Handpiece {
   SpindleParams spindle;                       // the motor, seen from the spindle
   NoiseBank noise;                             // of the free tool at rated speed
   std::array<double, kBladeModes> blade_hz{};  // 0: none
-  std::vector<std::vector<float>> clicks;      // the recording's impacts at the synthesis's rate
+  // The recording's impacts at the synthesis's rate, and how far the modes give way to each.
+  std::vector<std::vector<float>> clicks, click_weights;
 };
 
 // `tool`: null for none; then there are two teeth, and no blade but the preset's own.
