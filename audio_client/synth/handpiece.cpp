@@ -5,6 +5,7 @@
 
 #include "audio_client/synth/resonances.hpp"
 #include "common/core/check.hpp"
+#include "common/sound/levels.hpp"
 #include "common/sound/resample.hpp"
 #include "common/sound/transients.hpp"
 #include "common/tools/tool.hpp"
@@ -12,12 +13,12 @@
 namespace osteon::audio {
 namespace {
 
+using sound::amplitude_of_db;
+
 constexpr double kHardest_g_cm3 = 1.9;  // of ToolSound's hardness 1
 constexpr double kMostLoad = 1.5;       // of a material's own
 
 }  // namespace
-
-double amplitude_of_db(double db) noexcept { return std::pow(10.0, 0.05 * db); }
 
 double radiation(double hz) noexcept {
   const double low = hz * hz / (hz * hz + 200.0 * 200.0);

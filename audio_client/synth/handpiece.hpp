@@ -60,8 +60,6 @@ struct Handpiece {
 // `hardness`: density over 1.9 g/cm3.
 [[nodiscard]] Gains material_gains(const ToolModel& model, double load, double hardness, double perforated) noexcept;
 
-[[nodiscard]] double amplitude_of_db(double db) noexcept;
-
 // How well the hand piece's body radiates, 0 to 1. It radiates little below 200 Hz, and less and less above 7 kHz
 // (8.5.4: "the major frequencies are more active in the frequency range of 400-6000 Hz").
 [[nodiscard]] double radiation(double hz) noexcept;

@@ -6,9 +6,12 @@
 #include <span>
 
 #include "audio_client/synth/resonances.hpp"
+#include "common/sound/levels.hpp"
 
 namespace osteon::audio {
 namespace {
+
+using sound::amplitude_of_db;
 
 constexpr double kTurn = 2.0 * std::numbers::pi;
 
