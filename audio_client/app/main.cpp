@@ -49,7 +49,7 @@ using Clock = std::chrono::steady_clock;
 constexpr const char* kProgram = "osteon-audio";
 constexpr auto kPoll = 20ms;
 constexpr auto kReport = 50ms;  // to a window, from one to the next
-// Tools whose state was not received for so long run down. A working server sends their states at 120 Hz.
+// Tools whose state was not received for so long run down. A working server passes on up to 60 of each a second.
 constexpr auto kStale = 2s;
 // Running down takes at most half a second. An output that does not continue must not block the program.
 constexpr auto kRunDown = 2s;

@@ -17,6 +17,7 @@
 namespace osteon::audio {
 namespace {
 
+using sound::amplitude_of_db;
 using sound::DrillingState;
 
 constexpr int kRate_hz = kPresetTransientRate_hz;
@@ -40,8 +41,6 @@ std::string said(const char* format, Values... values) {
   std::snprintf(text.data(), text.size(), format, values...);
   return text.data();
 }
-
-double amplitude_of(double db) { return std::pow(10.0, 0.05 * db); }
 
 std::span<const float> part_of(std::span<const float> samples, const sound::StateSpan& span) {
   const auto from = std::min(samples.size(), static_cast<std::size_t>(span.from_s * kRate_hz));
@@ -136,7 +135,7 @@ double fitted_rpm(const std::vector<FoundPeak>& lines, const std::vector<SourceO
     for (const FoundPeak& line : lines)
       for (const SourceOrder& known : orders) {
         const double off = (line.hz / (tried / 60.0) / known.order - 1.0) / 0.002;
-        if (std::abs(off) < 4.0) sum += amplitude_of(line.level_db) * std::exp(-0.5 * off * off);
+        if (std::abs(off) < 4.0) sum += amplitude_of_db(line.level_db) * std::exp(-0.5 * off * off);
       }
     if (sum > best * (1.0 + 1e-9)) {
       best = sum;
@@ -177,8 +176,8 @@ double slowed_by(const ToolModel& model, const sound::Spectrum& cut) {
     double sum = 0;
     for (const Line& line : model.lines)
       if (line.teeth == 0)
-        sum += amplitude_of(line.level_db) *
-               amplitude_of(line_db(cut, ratio * line.order * model.rated_rpm / 60.0, 0.5 * kLineWidth));
+        sum += amplitude_of_db(line.level_db) *
+               amplitude_of_db(line_db(cut, ratio * line.order * model.rated_rpm / 60.0, 0.5 * kLineWidth));
     if (sum > best) {
       best = sum;
       best_ratio = ratio;

@@ -5,18 +5,20 @@
 
 #include "audio_client/synth/resonances.hpp"
 #include "common/core/check.hpp"
+#include "common/sound/levels.hpp"
 #include "common/sound/resample.hpp"
+#include "common/sound/transients.hpp"
 #include "common/tools/tool.hpp"
 
 namespace osteon::audio {
 namespace {
 
+using sound::amplitude_of_db;
+
 constexpr double kHardest_g_cm3 = 1.9;  // of ToolSound's hardness 1
 constexpr double kMostLoad = 1.5;       // of a material's own
 
 }  // namespace
-
-double amplitude_of_db(double db) noexcept { return std::pow(10.0, 0.05 * db); }
 
 double radiation(double hz) noexcept {
   const double low = hz * hz / (hz * hz + 200.0 * 200.0);
@@ -80,8 +82,10 @@ Handpiece make_handpiece(const ToolModel& model, const Tool* tool, double rate_h
   if (length_mm > 0 && thickness_mm > 0)
     for (int m = 0; m < kBladeModes; ++m)
       piece.blade_hz[static_cast<std::size_t>(m)] = beam_mode_hz(m, length_mm, thickness_mm);
-  for (const std::vector<float>& transient : model.transients)
+  for (const std::vector<float>& transient : model.transients) {
     piece.clicks.push_back(sound::resampled(transient, kPresetTransientRate_hz, static_cast<int>(rate_hz)));
+    piece.click_weights.push_back(sound::transient_weight(piece.clicks.back().size(), rate_hz));
+  }
   return piece;
 }
 

@@ -44,7 +44,8 @@ struct Handpiece {
   SpindleParams spindle;                       // the motor, seen from the spindle
   NoiseBank noise;                             // of the free tool at rated speed
   std::array<double, kBladeModes> blade_hz{};  // 0: none
-  std::vector<std::vector<float>> clicks;      // the recording's impacts at the synthesis's rate
+  // The recording's impacts at the synthesis's rate, and how far the modes give way to each.
+  std::vector<std::vector<float>> clicks, click_weights;
 };
 
 // `tool`: null for none; then there are two teeth, and no blade but the preset's own.
@@ -58,8 +59,6 @@ struct Handpiece {
 // `perforated`: 1 at breakthrough, then falling to 0.
 // `hardness`: density over 1.9 g/cm3.
 [[nodiscard]] Gains material_gains(const ToolModel& model, double load, double hardness, double perforated) noexcept;
-
-[[nodiscard]] double amplitude_of_db(double db) noexcept;
 
 // How well the hand piece's body radiates, 0 to 1. It radiates little below 200 Hz, and less and less above 7 kHz
 // (8.5.4: "the major frequencies are more active in the frequency range of 400-6000 Hz").

@@ -6,9 +6,12 @@
 #include <span>
 
 #include "audio_client/synth/resonances.hpp"
+#include "common/sound/levels.hpp"
 
 namespace osteon::audio {
 namespace {
+
+using sound::amplitude_of_db;
 
 constexpr double kTurn = 2.0 * std::numbers::pi;
 
@@ -160,7 +163,7 @@ void Voice::add_to(Block& block) noexcept {
   add_partials(block);
   add_cut(block);
   burst_.add_to(block);
-  modes_.add_to(block);
+  add_modes(block);
   add_click(block);
   const bool driven = rpm_ > 0 || target_.rpm > 0 || motor_.stalled();
   sounding_ = driven || burst_.ringing() || modes_.ringing() || click_level_ > 0;
@@ -268,6 +271,18 @@ void Voice::add_cut(Block& block) noexcept {
   chip_level_ = chip_to_;
   plate_level_ = plate_to_;
   blade_level_ = blade_to_;
+}
+
+// A recorded blow has its modes in it. They fade in as it fades out.
+void Voice::add_modes(Block& block) noexcept {
+  if (click_level_ == 0 || handpiece_->clicks.empty()) {
+    modes_.add_to(block);
+    return;
+  }
+  const std::span<const float> weight = std::span(handpiece_->click_weights[click_]).subspan(click_at_);
+  Block ringing{};
+  modes_.add_to(ringing);
+  for (std::size_t i = 0; i < block.size(); ++i) block[i] += (i < weight.size() ? 1.0F - weight[i] : 1.0F) * ringing[i];
 }
 
 void Voice::add_click(Block& block) noexcept {

@@ -43,6 +43,7 @@ class Voice {
   void add_partials(Block& block) noexcept;
   void add_cut(Block& block) noexcept;
   void tune_cut() noexcept;
+  void add_modes(Block& block) noexcept;
   void add_click(Block& block) noexcept;
 
   const Handpiece* handpiece_ = nullptr;  // owned by the synth, outlives the voice

@@ -33,7 +33,7 @@ inline constexpr const char* kEngaged = "data/engaged";
 inline constexpr const char* kTorque = "data/torque";
 inline constexpr const char* kState = "data/state";
 inline constexpr const char* kTool = "data/tool";
-// Recordings without a cortical layer, a broach or blows lack these.
+// Recordings of older versions lack these.
 inline constexpr const char* kCortex = "data/cortex";
 inline constexpr const char* kSeated = "data/seated";
 inline constexpr const char* kBlows = "data/blows";

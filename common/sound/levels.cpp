@@ -11,6 +11,8 @@ double power_db(double mean_square) {
   return mean_square > 0.0 ? std::max(kSilence_db, 10.0 * std::log10(mean_square)) : kSilence_db;
 }
 
+double amplitude_of_db(double db) noexcept { return std::pow(10.0, 0.05 * db); }
+
 double rms_db(std::span<const float> samples) {
   if (samples.empty()) return kSilence_db;
   double sum = 0;

@@ -12,7 +12,8 @@ inline constexpr double kSilence_db = -200.0;
 [[nodiscard]] double peak(std::span<const float> samples);  // largest magnitude, 1 = full scale
 // Largest difference between neighbouring samples. A sine of amplitude a has 2 a sin(pi f / rate).
 [[nodiscard]] double largest_step(std::span<const float> samples);
-[[nodiscard]] double power_db(double mean_square);  // 10 log10, not below kSilence_db
+[[nodiscard]] double power_db(double mean_square);         // 10 log10, not below kSilence_db
+[[nodiscard]] double amplitude_of_db(double db) noexcept;  // the factor on samples that changes a level by so much
 
 // Reference pressure p0 of sound levels in air, Pa.
 inline constexpr double kReference_pa = 20e-6;

@@ -3,6 +3,7 @@
 #include <sndfile.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <string>
 #include <system_error>
 #include <utility>
@@ -14,25 +15,37 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr const char* kAsItWas = "; an older file of that name is as it was";
+
 }  // namespace
 
 struct WavWriter::Impl {
   fs::path file, target, partial;
   WavFormat format;
+  Unfinished unfinished = Unfinished::removed;
   SNDFILE* out = nullptr;
   std::uint64_t frames = 0;
-  bool failed = false;
+  bool failed = false, left = false;
 
   ~Impl() {
     if (out) sf_close(out);
     std::error_code ignored;
-    fs::remove(partial, ignored);
+    if (!left) fs::remove(partial, ignored);
   }
 
-  [[nodiscard]] tl::unexpected<Error> not_whole(const std::error_code& why) {
+  [[nodiscard]] std::string not_whole(const std::error_code& why) const {
+    return "the sound " + file.string() + " could not be written whole (" + why.message() + ")";
+  }
+  [[nodiscard]] tl::unexpected<Error> not_written(const std::error_code& why) {
     failed = true;
-    return failure(ErrorCode::internal, "the sound " + file.string() + " could not be written whole (" + why.message() +
-                                            "); an older file of that name is as it was");
+    // close() still decides what becomes of a sound that is kept.
+    const bool kept = unfinished == Unfinished::kept;
+    return failure(ErrorCode::internal, not_whole(why) + (kept ? "" : kAsItWas));
+  }
+  [[nodiscard]] tl::unexpected<Error> not_closed(const std::error_code& why) {
+    left = unfinished == Unfinished::kept;
+    return failure(ErrorCode::internal,
+                   not_whole(why) + (left ? "; " + partial.string() + " has what came until then" : kAsItWas));
   }
 };
 
@@ -41,7 +54,7 @@ WavWriter::~WavWriter() = default;
 WavWriter::WavWriter(WavWriter&&) noexcept = default;
 WavWriter& WavWriter::operator=(WavWriter&&) noexcept = default;
 
-Result<WavWriter> WavWriter::open(const fs::path& file, const WavFormat& format) {
+Result<WavWriter> WavWriter::open(const fs::path& file, const WavFormat& format, Unfinished unfinished) {
   OSTEON_CHECK(format.channels > 0 && (format.bits == 16 || format.bits == 24));
   std::error_code error;
   // A rename would replace a link, a device or a pipe by a file.
@@ -54,6 +67,7 @@ Result<WavWriter> WavWriter::open(const fs::path& file, const WavFormat& format)
   impl->target = impl->partial = target;
   impl->partial += ".partial-" + std::to_string(::getpid());
   impl->format = format;
+  impl->unfinished = unfinished;
   SF_INFO info{};
   info.samplerate = format.rate_hz;
   info.channels = format.channels;
@@ -71,23 +85,30 @@ Result<void> WavWriter::write(std::span<const float> samples) {
   OSTEON_CHECK(samples.size() % channels == 0);
   const std::uint64_t count = samples.size() / channels;
   const auto frame_bytes = static_cast<std::uint64_t>(impl_->format.channels * impl_->format.bits / 8);
+  // Behind the sample that the disk did not take whole, others would be misplaced.
+  if (impl_->failed) return impl_->not_written(std::make_error_code(std::errc::no_space_on_device));
   if ((impl_->frames + count) * frame_bytes > kMostBytes)
     return failure(ErrorCode::exhausted,
                    "the sound " + impl_->file.string() + " is full, because a WAV file holds 4 GB; begin another file");
-  if (sf_writef_float(impl_->out, samples.data(), static_cast<sf_count_t>(count)) != static_cast<sf_count_t>(count))
-    return impl_->not_whole(std::make_error_code(std::errc::no_space_on_device));
-  impl_->frames += count;
+  const sf_count_t taken = sf_writef_float(impl_->out, samples.data(), static_cast<sf_count_t>(count));
+  impl_->frames += static_cast<std::uint64_t>(std::max<sf_count_t>(0, taken));
+  if (taken != static_cast<sf_count_t>(count))
+    return impl_->not_written(std::make_error_code(std::errc::no_space_on_device));
   return {};
 }
 
 void WavWriter::update_header() { sf_command(impl_->out, SFC_UPDATE_HEADER_NOW, nullptr, 0); }
 
 Result<void> WavWriter::close() {
-  if (sf_close(std::exchange(impl_->out, nullptr)) != 0 || impl_->failed)
-    return impl_->not_whole(std::make_error_code(std::errc::no_space_on_device));
+  // sf_close() does not say whether the disk took the header.
+  update_header();
+  const bool header = sf_error(impl_->out) == SF_ERR_NO_ERROR;
+  const bool closed = sf_close(std::exchange(impl_->out, nullptr)) == 0;
+  const bool whole = !impl_->failed || impl_->unfinished == Unfinished::kept;
+  if (!header || !closed || !whole) return impl_->not_closed(std::make_error_code(std::errc::no_space_on_device));
   std::error_code error;
   fs::rename(impl_->partial, impl_->target, error);
-  if (error) return impl_->not_whole(error);
+  if (error) return impl_->not_closed(error);
   return {};
 }
 

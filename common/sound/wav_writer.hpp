@@ -15,22 +15,32 @@ struct WavFormat {
   int bits = 16;  // 16 or 24, PCM
 };
 
+// What becomes of a sound that could not be written whole.
+enum class Unfinished : std::uint8_t {
+  removed,  // it can be made again
+  kept,     // it cannot
+};
+
 class WavWriter {
  public:
   // The size in a header has 32 bits.
   static constexpr std::uint64_t kMostBytes = 4'000'000'000;
 
   // Begins FILE.partial-PID beside the file. Error internal: it cannot be made; names the file.
-  [[nodiscard]] static Result<WavWriter> open(const std::filesystem::path& file, const WavFormat& format);
+  [[nodiscard]] static Result<WavWriter> open(const std::filesystem::path& file, const WavFormat& format,
+                                              Unfinished unfinished = Unfinished::removed);
   ~WavWriter();  // without close(): removes what was begun; an older file of that name is as it was
   WavWriter(WavWriter&&) noexcept;
   WavWriter& operator=(WavWriter&&) noexcept;
 
   // Frames of interleaved samples; beyond full scale they are clipped. Errors: internal (disk), exhausted (kMostBytes).
+  // After an error of the disk, frames() counts what it has taken, and nothing more is written.
   [[nodiscard]] Result<void> write(std::span<const float> samples);
   // Writes the length so far into the header, for whoever reads the unfinished file of a killed program.
   void update_header();
-  // Renames the file. Error internal: it could not be written whole.
+  // Renames the file. With Unfinished::kept, also after an error of write(): it then has the frames that were taken.
+  // Error internal: it could not be written whole, or not be renamed. What is kept then stays in FILE.partial-PID,
+  // which the sentence names.
   [[nodiscard]] Result<void> close();
   [[nodiscard]] std::uint64_t frames() const;
 

@@ -24,6 +24,12 @@ TEST(Levels, SineOfFullScaleIsThreeDecibelsBelow) {
   EXPECT_NEAR(peak(sine(1000, 0.5, 48000)), 0.5, 1e-6);
 }
 
+TEST(Levels, TwentyDecibelsAreTenTimesTheAmplitude) {
+  EXPECT_DOUBLE_EQ(amplitude_of_db(0), 1);
+  EXPECT_NEAR(amplitude_of_db(-20), 0.1, 1e-15);
+  for (const double db : {-40.0, -6.0}) EXPECT_NEAR(rms_db(sine(1000, amplitude_of_db(db), 48000)), db - 3.0103, 1e-3);
+}
+
 TEST(Levels, APeakBelowZeroCountsAsOneAbove) {
   EXPECT_EQ(peak(std::vector<float>{0.25F, -0.75F, 0.5F}), 0.75);
   EXPECT_EQ(peak(std::vector<float>{-0.5F}), 0.5);

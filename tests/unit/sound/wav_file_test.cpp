@@ -2,14 +2,18 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sndfile.h>
+#include <sys/resource.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cmath>
+#include <csignal>
 #include <filesystem>
 #include <fstream>
 #include <limits>
 #include <random>
+#include <set>
 #include <string>
 #include <string_view>
 #include <tuple>
@@ -18,6 +22,7 @@
 #include "common/sound/resample.hpp"
 #include "common/sound/tones.hpp"
 #include "common/sound/wav_file.hpp"
+#include "common/sound/wav_writer.hpp"
 #include "tests/support/content.hpp"
 #include "tests/support/temp_dir.hpp"
 #include "tests/unit/sound/signals.hpp"
@@ -157,6 +162,106 @@ TEST(WavFile, APlaceThatCannotBeWrittenIsNamed) {
   const auto written = write_wav("/nowhere/a.wav", std::vector<float>(100, 0.0F), 22050);
   ASSERT_FALSE(written);
   EXPECT_THAT(written.error().message, testing::HasSubstr("/nowhere/a.wav"));
+}
+
+// A full disk: while it lives, no file of this program grows beyond kBytes.
+class FullDisk {
+ public:
+  FullDisk() : handler_(std::signal(SIGXFSZ, SIG_IGN)) {
+    EXPECT_EQ(::getrlimit(RLIMIT_FSIZE, &before_), 0);
+    rlimit limit = before_;
+    limit.rlim_cur = kBytes;
+    EXPECT_EQ(::setrlimit(RLIMIT_FSIZE, &limit), 0);
+  }
+  ~FullDisk() {
+    ::setrlimit(RLIMIT_FSIZE, &before_);
+    std::signal(SIGXFSZ, handler_);
+  }
+  FullDisk(const FullDisk&) = delete;
+  FullDisk& operator=(const FullDisk&) = delete;
+
+  // A header of 44 bytes, samples of 3 bytes, and a part of the next one.
+  static constexpr std::size_t kSamples = 20000, kBytes = 44 + 3 * kSamples + 2;
+
+ private:
+  void (*handler_)(int);
+  rlimit before_{};
+};
+
+constexpr WavFormat kRecording{.rate_hz = 22050, .channels = 1, .bits = 24};
+
+Result<void> write_in_pieces(WavWriter& writer, std::span<const float> samples) {
+  constexpr std::size_t kPiece = 1500;  // samples
+  Result<void> written;
+  for (std::size_t at = 0; at < samples.size() && written; at += kPiece)
+    written = writer.write(samples.subspan(at, std::min(kPiece, samples.size() - at)));
+  return written;
+}
+
+TEST(WavWriter, KeepsWhatAFullDiskTook) {
+  const test::TempDir temp;
+  const fs::path file = temp / "a.wav";
+  const std::vector<float> samples = tone(440, 0.5, 2 * FullDisk::kSamples, 22050);
+  auto writer = WavWriter::open(file, kRecording, Unfinished::kept);
+  ASSERT_TRUE(writer) << writer.error().message;
+  Result<void> written, closed;
+  {
+    const FullDisk disk;
+    written = write_in_pieces(*writer, samples);
+  }
+  ASSERT_FALSE(written);
+  EXPECT_THAT(written.error().message, testing::HasSubstr(file.string()));
+  EXPECT_THAT(written.error().message, testing::Not(testing::HasSubstr("as it was")));
+  EXPECT_FALSE(writer->write(samples)) << "there is room again, but a part of a sample is before it";
+  {
+    const FullDisk disk;
+    closed = writer->close();
+  }
+  ASSERT_TRUE(closed) << closed.error().message;
+  EXPECT_EQ(writer->frames(), FullDisk::kSamples);
+  EXPECT_EQ(test::names_in(temp.path()), std::set<std::string>{"a.wav"});
+  const auto read = read_wav(file);
+  ASSERT_TRUE(read) << read.error().message;
+  EXPECT_FALSE(read->announced_s);
+  ASSERT_EQ(read->samples.size(), FullDisk::kSamples);
+  for (std::size_t i = 0; i < read->samples.size(); ++i) ASSERT_NEAR(read->samples[i], samples[i], 1e-6) << i;
+}
+
+TEST(WavWriter, WhatCanBeMadeAgainLeavesAFullDiskAsItWas) {
+  const test::TempDir temp;
+  const fs::path file = temp / "a.wav";
+  put(file, "older");
+  {
+    auto writer = WavWriter::open(file, kRecording);
+    ASSERT_TRUE(writer) << writer.error().message;
+    const FullDisk disk;
+    const auto written = write_in_pieces(*writer, tone(440, 0.5, 2 * FullDisk::kSamples, 22050));
+    const auto closed = writer->close();
+    for (const Result<void>& result : {written, closed}) {
+      ASSERT_FALSE(result);
+      EXPECT_THAT(result.error().message, testing::HasSubstr("as it was"));
+    }
+  }
+  EXPECT_EQ(test::content(file), "older");
+  EXPECT_EQ(test::names_in(temp.path()), std::set<std::string>{"a.wav"});
+}
+
+TEST(WavWriter, WhatIsKeptAndCannotGetItsNameIsLeftAndNamed) {
+  const test::TempDir temp;
+  const fs::path file = temp / "a.wav", partial = temp / ("a.wav.partial-" + std::to_string(::getpid()));
+  const std::vector<float> samples = tone(440, 0.5, 22050, 22050);
+  {
+    auto writer = WavWriter::open(file, kRecording, Unfinished::kept);
+    ASSERT_TRUE(writer) << writer.error().message;
+    ASSERT_TRUE(writer->write(samples));
+    ASSERT_TRUE(fs::create_directory(file));
+    const auto closed = writer->close();
+    ASSERT_FALSE(closed);
+    EXPECT_THAT(closed.error().message, testing::HasSubstr(partial.string() + " has what came until then"));
+  }
+  const auto read = read_wav(partial);
+  ASSERT_TRUE(read) << read.error().message;
+  EXPECT_EQ(read->samples.size(), samples.size());
 }
 
 TEST(WavFile, OfACutFileIsReadWhatIsThere) {
