@@ -3,8 +3,13 @@
 #include <algorithm>
 #include <cmath>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "audio_client/offline/state_record.hpp"
+#include "audio_client/presets/preset_file.hpp"
+#include "audio_client/synth/handpiece.hpp"
+#include "audio_client/synth/voice.hpp"
 #include "common/core/check.hpp"
 #include "common/core/digest.hpp"
 #include "common/sound/random.hpp"
@@ -103,6 +108,28 @@ void read_any_log(std::span<const std::uint8_t> data) {
   }
 }
 
+// What is read can be played: a tool that runs up in bone, and is struck.
+void play_any_preset(std::span<const std::uint8_t> data) {
+  const auto model = audio::parse_preset({reinterpret_cast<const char*>(data.data()), data.size()}, "preset.yaml");
+  if (!model) return expect_bounded(model.error());
+  const audio::Handpiece piece = audio::make_handpiece(*model, nullptr, 48000);
+  audio::ToolSound tool;
+  tool.rpm = 1000;
+  tool.load = tool.hardness = tool.chips = 1;
+  tool.torque_Nmm = 20;
+  tool.cortex_mm = 2;
+  audio::Voice voice;
+  voice.start(piece, {}, 48000, tool, 1);
+  tool.blows = 1;
+  tool.blow_impulse_N_s = 3;
+  for (int i = 0; i < 8; ++i) {
+    voice.aim(tool);
+    audio::Block block{};
+    voice.add_to(block);
+    OSTEON_CHECK(std::ranges::all_of(block, [](float x) { return std::isfinite(x); }));
+  }
+}
+
 }  // namespace
 
 Target wav_file_target() {
@@ -126,6 +153,21 @@ Target session_log_target() {
                                "0.000,5000000,1,free,drill-3.2,1,2,3,0,0,0,1000,0,1,0\n"
                                "0.001,6000000,2,cutting,drill-3.2,1,2,3.01,27.5,0.9,1.9,980.5,25.25,1,1\n")}};
   target.mutations = 500;
+  target.change = change_number;
+  return target;
+}
+
+Target preset_target() {
+  std::vector<Bytes> seeds;
+  for (audio::ToolModel model : audio::builtin_presets()) {
+    if (model.drive == audio::Drive::blows) {
+      model.recorded_s = 2;
+      model.transients.assign(1, std::vector<float>(441, 0.25F));
+    }
+    seeds.push_back(bytes_of_text(audio::to_yaml(model)));
+  }
+  Target target{"sound_preset", play_any_preset, std::move(seeds)};
+  target.mutations = 100;
   target.change = change_number;
   return target;
 }

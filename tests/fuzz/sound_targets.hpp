@@ -1,4 +1,4 @@
-// Fuzz targets for files of sounds that untrusted people can send: recordings, models and records of sessions.
+// Fuzz targets for files of sounds that untrusted people can send: recordings, models, records of sessions and presets.
 #pragma once
 #include "tests/fuzz/targets.hpp"
 
@@ -7,5 +7,6 @@ namespace osteon::fuzz {
 [[nodiscard]] Target wav_file_target();     // WAV and RF64
 [[nodiscard]] Target sound_model_target();  // a spectral model, whose digest is right
 [[nodiscard]] Target session_log_target();  // a CSV of osteon-haptic --session-log
+[[nodiscard]] Target preset_target();       // YAML: the sound of a group of tools
 
 }  // namespace osteon::fuzz

@@ -261,7 +261,8 @@ std::vector<Target> targets() {
       sound_message_target(),
       wav_file_target(),
       sound_model_target(),
-      session_log_target()};
+      session_log_target(),
+      preset_target()};
 }
 
 }  // namespace osteon::fuzz
