@@ -26,7 +26,9 @@ void SpindleMotor::aim(double rpm, double torque_Nmm) noexcept {
   torque_Nmm_ = std::max(0.0, torque_Nmm);
   if (rpm >= kTurning_rpm) {
     torque_Nmm_ = std::min({torque_Nmm_, kCarried * params_.most_nmm, rpm / params_.droop_rpm_per_nmm});
-    command_rpm_ = rpm + spindle_.unloaded_rpm - spindle_.rpm;
+    // A motor that comes from rest has lost nothing yet, but will.
+    command_rpm_ = rpm + (spindle_.unloaded_rpm < kTurning_rpm ? params_.droop_rpm_per_nmm * torque_Nmm_
+                                                               : spindle_.unloaded_rpm - spindle_.rpm);
     span_rpm_ = std::max(span_rpm_, rpm);
   } else if (torque_Nmm_ > 0 && command_rpm_ > 0) {
     torque_Nmm_ = std::max(torque_Nmm_, kStallTorque * params_.most_nmm);

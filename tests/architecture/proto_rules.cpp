@@ -58,7 +58,7 @@ bool needs_unit(const pb::FieldDescriptor* field) {
 
 bool names_unit(const std::string& comment) {
   static const std::regex unit(
-      R"((^|[\s;,(])(mm(\^[23])?|mm/s|s|ms|seconds|microseconds|N|N mm|N/mm|g/cm\^3|HU|radians|hertz|Hz|)"
+      R"((^|[\s;,(])(mm(\^[23])?|mm/s|s|ms|ns|seconds|microseconds|N|N mm|N/mm|g/cm\^3|HU|radians|hertz|Hz|)"
       R"(revolutions per minute|steps of \S+( mm)?|samples( of the level)?|blocks|0 to \d+|id|count|number|text|bytes|)"
       R"(no unit|see there|unit as named by the holder)([\s;,.)]|$))");
   return std::regex_search(comment, unit);

@@ -35,7 +35,7 @@ TEST(Simulation, KeepsItsPromisesWhateverHappens) {
   EXPECT_GT(sum.undone, trials(100));
   EXPECT_GT(sum.decisions, trials(500));
   EXPECT_GT(sum.forbidden, trials(100));
-  EXPECT_GT(sum.denied, trials(20));
+  EXPECT_GT(sum.denied, trials(20, 2));  // so rare that a quarter of the seeds may have less than a quarter
   EXPECT_GT(sum.carried, trials(10));
   EXPECT_GT(sum.crashes, trials(300));
   EXPECT_GT(sum.disk_failures, trials(8));

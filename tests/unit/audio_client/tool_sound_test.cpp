@@ -185,6 +185,17 @@ TEST(SpindleMotor, FollowsTheSpindleThroughLoadStallAndRecovery) {
   EXPECT_LT(worst_rpm, 1400 * 0.12);
 }
 
+// No second state comes, because nothing changes.
+TEST(SpindleMotor, ASingleStateUnderLoadIsItsSpeed) {
+  const ToolModel* drill = preset_for(builtin_presets(), "", "drill");
+  ASSERT_NE(drill, nullptr);
+  SpindleMotor motor;
+  motor.start(at_spindle(drill->motor, drill->rated_rpm), drill->motor.run_down_s);
+  motor.aim(1200, 27);
+  for (int ms = 0; ms < 2000; ++ms) motor.step(0.001);
+  EXPECT_NEAR(motor.rpm(), 1200.0, 1.0);
+}
+
 TEST(SpindleMotor, AStalledDrillIsSilentAndComesBack) {
   Player player(1, kLinesAlone);
   static_cast<void>(player.play(free_tool(), 0.75));
