@@ -195,6 +195,25 @@ class Window {
   Clock::time_point reported_;
 };
 
+// No file that is written is another one that is written, or a preset that is read.
+Result<void> check_outputs(const Options& options) {
+  const std::pair<const char*, std::filesystem::path> written[] = {
+      {"--wav", options.wav_file}, {"--state-log", options.state_log_file}, {"--summary", options.summary_file}};
+  std::vector<std::pair<std::string, std::filesystem::path>> known;
+  for (const std::string& preset : options.presets) known.emplace_back("--preset", preset);
+  for (const auto& [option, file] : written) {
+    if (file.empty()) continue;
+    std::error_code ignored;
+    const std::filesystem::path place = std::filesystem::weakly_canonical(file, ignored);
+    for (const auto& [other, there] : known)
+      if (std::filesystem::weakly_canonical(there, ignored) == place)
+        return failure(ErrorCode::invalid_input,
+                       std::string(option) + " and " + other + " are one file, " + file.string() + "; name two");
+    known.emplace_back(option, file);
+  }
+  return {};
+}
+
 Result<void> run(const Options& options, const StopSignal& stop) {
   const Result<wire::ClientCredentials> credentials = wire::client_credentials(options.credentials);
   if (!credentials) return tl::unexpected(credentials.error());
@@ -210,6 +229,7 @@ Result<void> run(const Options& options, const StopSignal& stop) {
   if (Result<void> usable = check_writable(options.state_log_file, "the state log", "--state-log"); !usable)
     return usable;
   if (Result<void> usable = check_writable(options.wav_file, "the recording", "--wav"); !usable) return usable;
+  if (Result<void> apart = check_outputs(options); !apart) return apart;
   Result<std::vector<audio::ToolModel>> presets = audio::presets_of(options.presets);
   if (!presets) return tl::unexpected(presets.error());
   std::optional<audio::WavRecorder> recorder;

@@ -73,7 +73,9 @@ struct SoundInput::Impl {
   // [audio]
   static int callback(void*, void* in, unsigned frames, double, RtAudioStreamStatus, void* self) {
     Impl& impl = *static_cast<Impl*>(self);
-    impl.push({static_cast<const float*>(in), std::size_t{frames} * impl.params.channels});
+    // Without its server, RtAudio calls on and on with the last buffer, faster than sound.
+    if (!input_failed.load(std::memory_order_relaxed))
+      impl.push({static_cast<const float*>(in), std::size_t{frames} * impl.params.channels});
     return 0;
   }
 

@@ -117,7 +117,11 @@ class PulseOutput final : public AudioOutput {
  private:
   // [audio]
   static int callback(void* out, void*, unsigned frames, double, RtAudioStreamStatus, void* self) {
-    static_cast<PulseOutput*>(self)->fill(static_cast<float*>(out), frames);
+    // Without its server, RtAudio calls on and on, faster than sound. What is rendered then would be recorded.
+    if (!stream_failed.load(std::memory_order_relaxed))
+      static_cast<PulseOutput*>(self)->fill(static_cast<float*>(out), frames);
+    else
+      std::fill_n(static_cast<float*>(out), std::size_t{kChannels} * frames, 0.0F);
     return 0;
   }
 

@@ -141,5 +141,23 @@ TEST_F(RecordCommand, SaysThatNoServerAnswers) {
   EXPECT_FALSE(std::filesystem::exists(file()));
 }
 
+// The last one: it ends the server of deploy/with-null-sink. A recording is no longer than the time that it took.
+TEST_F(RecordCommand, WithoutItsServerNoSoundIsMadeUp) {
+  const auto begin = std::chrono::steady_clock::now();
+  test::Process audio(test::program("osteon-audio"), {"record", file()});
+  const auto partial = temp_ / ("x.wav.partial-" + std::to_string(audio.pid()));
+  std::error_code none;
+  ASSERT_TRUE(test::wait_until([&] { return std::filesystem::file_size(partial, none) > 100'000 && !none; }, 30s))
+      << audio.err();
+  EXPECT_EQ(test::run("pactl", {"exit"}).exit_code, 0);
+  EXPECT_EQ(audio.wait(30s), 1);
+  EXPECT_THAT(audio.err(), HasSubstr("has what came until then"));
+  const std::chrono::duration<double> took = std::chrono::steady_clock::now() - begin;
+  const auto sound = sound::read_wav(file());
+  ASSERT_TRUE(sound) << sound.error().message;
+  EXPECT_GT(sound->seconds(), 0.5);
+  EXPECT_LT(sound->seconds(), took.count());
+}
+
 }  // namespace
 }  // namespace osteon::audio

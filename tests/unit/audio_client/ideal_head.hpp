@@ -16,9 +16,8 @@ inline constexpr double kHeadRadius_mm = 87.5;  // Woodworth's and Kuhn's
 // one round the sphere.
 [[nodiscard]] double woodworth_delay_s(double along);
 
-// The measured impulses end here. A head keeps the power of noise, so below, tones are louder by the root of 24 kHz
-// over this: 3.3 %, or 0.28 dB.
-inline constexpr double kImpulse_hz = 22'500, kToneGain = 1.0328, kToneGain_db = 0.28;
+// The measured impulses end here.
+inline constexpr double kImpulse_hz = 22'500;
 
 // Level of an ear, by the same cosine.
 using EarLevel = std::function<double(double along)>;

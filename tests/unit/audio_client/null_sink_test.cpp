@@ -221,6 +221,7 @@ TEST(RestartedServer, IsPlayedToAgain) {
   ToneSource source;
   ReconnectingOutput output([&] { return open_output({.kind = OutputKind::pulse}, source); });
   ASSERT_TRUE(output.open()) << output.trouble();
+  const auto begin = Clock::now();
   ASSERT_TRUE(output.start());
   ASSERT_TRUE(test::wait_until([&] { return source.frames > 4800; }, 30s));
 
@@ -232,6 +233,9 @@ TEST(RestartedServer, IsPlayedToAgain) {
       },
       30s));
   EXPECT_EQ(output.trouble(), "the sound server went away; start it again, or use --output none with --wav FILE");
+  // No more is rendered than time has passed, and fits into the buffers.
+  const std::chrono::duration<double> took = Clock::now() - begin;
+  EXPECT_LT(static_cast<double>(source.frames), 48000 * took.count() + 4 * 256 + 4800);
 
   test::ProcessOptions home;
   home.environment = {{"HOME", folder}};

@@ -266,6 +266,22 @@ TEST(AudioProgram, WrongInputsAreOneSentenceEach) {
   }
 }
 
+TEST(AudioProgram, WritesNoFileOverAnotherOne) {
+  const test::TempDir temp;
+  const std::string file = (temp / "a.yaml").string();
+  ASSERT_TRUE(write_file(file, "a preset of hours of work"));
+  const std::vector<std::vector<std::string>> wrong = {
+      {"--preset", file, "--wav", file}, {"--wav", file, "--summary", file}, {"--state-log", file, "--summary", file}};
+  for (const std::vector<std::string>& options : wrong) {
+    std::vector<std::string> arguments{"--server", "127.0.0.1:1", "--plain", "--output", "none"};
+    arguments.insert(arguments.end(), options.begin(), options.end());
+    const test::RunResult result = test::run(test::program("osteon-audio"), arguments);
+    EXPECT_EQ(result.exit_code, 1);
+    EXPECT_THAT(result.err, testing::HasSubstr("are one file, " + file)) << result.err;
+    EXPECT_EQ(*read_file(file), "a preset of hours of work");
+  }
+}
+
 TEST(AudioProgram, WithoutAServerAnEarlierRecordingStays) {
   const test::TempDir temp;
   ASSERT_TRUE(write_file(temp / "a.wav", "earlier sound"));
