@@ -31,8 +31,8 @@ class Hrtf {
  public:
   static constexpr int kMostTaps = 1024;  // of a measured response; longer ones are of rooms, not of heads
 
-  // Noise of 400 to 6000 Hz from straight ahead keeps its power, as the mean of both ears. Errors, invalid_input: fewer than 4
-  // directions; responses that are empty, too long, not finite, or silent ahead.
+  // Noise of 400 to 6000 Hz from straight ahead keeps its power, as the mean of both ears. Errors, invalid_input: fewer
+  // than 4 directions; responses that are empty, too long, not finite, or silent ahead.
   [[nodiscard]] static Result<Hrtf> make(std::span<const HeadResponse> measured, double rate_hz);
 
   // What reaches the ears from a direction, a unit vector. It is continuous in the direction. [audio]
