@@ -9,8 +9,12 @@
 #include <cstdio>
 #include <memory>
 #include <optional>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "audio_client/app/output_file.hpp"
+#include "audio_client/app/preset_command.hpp"
 #include "audio_client/offline/offline_sound.hpp"
 #include "audio_client/offline/state_record.hpp"
 #include "common/runtime/progress.hpp"
@@ -25,6 +29,7 @@ struct RenderArguments {
   std::string record, out;
   int rate_hz = 48000, bits = 16;
   std::uint64_t seed = 1;
+  std::vector<std::string> presets;
 };
 
 std::string summary(const RenderArguments& a, const OfflineSound& sound, double work_s) {
@@ -39,8 +44,12 @@ std::string summary(const RenderArguments& a, const OfflineSound& sound, double 
 }
 
 Result<std::string> run_render(const RenderArguments& a) {
-  if (auto usable = check_output(a.out, "the sound", "--out", {a.record}); !usable)
-    return tl::unexpected(usable.error());
+  std::vector<std::string> read = a.presets;
+  read.push_back(a.record);
+  for (const std::string& one : read)
+    if (auto usable = check_output(a.out, "the sound", "--out", {one}); !usable) return tl::unexpected(usable.error());
+  auto presets = presets_of(a.presets);
+  if (!presets) return tl::unexpected(presets.error());
   auto record = open_states(a.record);
   if (!record) return tl::unexpected(record.error());
   auto writer = sound::WavWriter::open(a.out, {.rate_hz = a.rate_hz, .channels = 1, .bits = a.bits});
@@ -56,6 +65,7 @@ Result<std::string> run_render(const RenderArguments& a) {
   SynthParams params;
   params.rate_hz = a.rate_hz;
   params.seed = a.seed;
+  params.presets = std::move(*presets);
   const auto begin = std::chrono::steady_clock::now();
   const auto sound = render_states(
       **record, params, [&](std::span<const float> frames) { return writer->write(frames); }, keep_going);
@@ -84,6 +94,10 @@ void add_render_command(CLI::App& app, std::function<Result<std::string>()>& cho
   command->add_option("--bits", a.bits, "Of a sample: 16 or 24")->check(CLI::IsMember({16, 24}))->capture_default_str();
   command->add_option("--seed", a.seed, "Of the noise: the same gives the same sound; the live one has 1")
       ->capture_default_str();
+  command
+      ->add_option("--preset", a.presets,
+                   "Preset of a tool's sound, or a folder of presets, which go before those of Osteon; may be repeated")
+      ->allow_extra_args(false);
   command->callback([shared, &chosen] { chosen = [shared] { return run_render(*shared); }; });
 }
 

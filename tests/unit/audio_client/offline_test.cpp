@@ -9,6 +9,7 @@
 #include <cmath>
 #include <csignal>
 #include <fstream>
+#include <span>
 #include <string>
 #include <thread>
 #include <vector>
@@ -17,6 +18,7 @@
 #include "audio_client/offline/state_record.hpp"
 #include "audio_client/output/sound_engine.hpp"
 #include "common/runtime/files.hpp"
+#include "common/sound/tones.hpp"
 #include "common/sound/wav_file.hpp"
 #include "haptic_client/app/record_file.hpp"
 #include "tests/support/process.hpp"
@@ -145,7 +147,7 @@ TEST(StateRecord, ReadsWhatTheHapticClientWrites) {
   haptic::DeviceInfo device;
   ASSERT_TRUE(log.open(temp / "a.csv", device, AuthorId{7}));
   constexpr int kRows = 9000;  // more than are read at once
-  const auto row = [](int i) {
+  const auto row_of = [](int i) {
     haptic::TickRow row;
     row.mono_ns = kBegin_ns + 1'000'000LL * i;
     row.report.state_seq = static_cast<std::uint64_t>(i + 1);
@@ -162,7 +164,7 @@ TEST(StateRecord, ReadsWhatTheHapticClientWrites) {
     return row;
   };
   for (int i = 0; i < kRows; ++i) {
-    const haptic::TickRow one = row(i);
+    const haptic::TickRow one = row_of(i);
     ASSERT_TRUE(file->append({&one, 1}));
     log.write(one, info.tools[static_cast<std::size_t>(one.report.tool)].name);
   }
@@ -177,7 +179,7 @@ TEST(StateRecord, ReadsWhatTheHapticClientWrites) {
       const auto state = (*record)->next();
       ASSERT_TRUE(state) << state.error().message;
       ASSERT_TRUE(*state) << i;
-      const haptic::TickRow expected = row(i);
+      const haptic::TickRow expected = row_of(i);
       ASSERT_EQ((*state)->time_ns, expected.mono_ns);
       ASSERT_EQ((*state)->author, AuthorId{7});
       ASSERT_EQ((*state)->state_seq, expected.report.state_seq);
@@ -278,6 +280,27 @@ TEST(RenderCommand, WritesTheSoundOfALog) {
   const std::vector<float> expected = rendered(**record);
   ASSERT_EQ(sound->samples.size(), expected.size());
   for (std::size_t i = 0; i < expected.size(); i += 7) ASSERT_NEAR(sound->samples[i], expected[i], 1.1 / 32768) << i;
+}
+
+// A drill of one's own, which has nothing but one line: that of its spindle's tenth order.
+TEST(RenderCommand, PlaysAToolByItsPreset) {
+  const test::TempDir temp;
+  ASSERT_TRUE(write_file(temp / "log.csv", long_log(240)));
+  ASSERT_TRUE(write_file(temp / "own.yaml",
+                         "name: own\ntools: [drill]\ndrive: rotation\nrated_rpm: 1345\n"
+                         "lines:\n  - {order: 10, level_db: -20, source: shaft}\n"));
+  const std::string own = (temp / "own.yaml").string();
+  const auto ran = test::run(test::program("osteon-audio"), {"render", (temp / "log.csv").string(), "--out",
+                                                             (temp / "x.wav").string(), "--preset", own});
+  ASSERT_EQ(ran.exit_code, 0) << ran.err;
+  const auto sound = sound::read_wav(temp / "x.wav");
+  ASSERT_TRUE(sound) << sound.error().message;
+  const std::span<const float> steady = std::span(sound->samples).subspan(48000, 48000);
+  EXPECT_NEAR(sound::find_tone(steady, 48000, 100, 8000).hz, 10 * 1345 / 60.0, 1.0);
+  const auto lost =
+      test::run(test::program("osteon-audio"), {"render", (temp / "log.csv").string(), "--out", own, "--preset", own});
+  EXPECT_EQ(lost.exit_code, 1);
+  EXPECT_THAT(lost.err, HasSubstr("would lose what is read"));
 }
 
 TEST(RenderCommand, RefusesToLoseTheRecord) {
