@@ -186,14 +186,15 @@ TEST_F(AudioProcess, StatesAreHeardLoggedAndRecorded) {
 
   std::printf("%s\n", summary.dump().c_str());
 
-  // The loudest half second is cortical drilling. It contains the output mesh at 48 x 20 Hz.
+  // The loudest half second is cortical drilling. It contains the output mesh at 48 x 20 Hz, but for the moment after
+  // the load came, in which the motor lost up to 19 rpm.
   std::size_t loudest = 0;
   double loudest_db = sound::kSilence_db;
   for (std::size_t at = 0; at + 24000 <= heard.size(); at += 2400) {
     const double db = sound::rms_db(std::span(heard).subspan(at, 24000));
     if (db > loudest_db) loudest_db = db, loudest = at;
   }
-  EXPECT_NEAR(sound::find_tone(std::span(heard).subspan(loudest, 24000), 48000, 940, 980).hz, 960, 0.2);
+  EXPECT_NEAR(sound::find_tone(std::span(heard).subspan(loudest, 24000), 48000, 940, 980).hz, 960, 1.0);
   EXPECT_EQ(sound::peak(std::span(heard).last(kSilent_frames)), 0) << "the recording ends in silence";
 }
 
