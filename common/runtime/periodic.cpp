@@ -7,21 +7,18 @@
 
 namespace osteon {
 
-PeriodicTimer::PeriodicTimer(std::chrono::nanoseconds period, std::chrono::nanoseconds most_spin)
-    : period_(period), margin_(most_spin), due_(std::chrono::steady_clock::now() + period), woke_(due_ - period) {
+PeriodicTimer::PeriodicTimer(std::chrono::nanoseconds period, std::chrono::nanoseconds spin)
+    : period_(period), spin_(spin), due_(std::chrono::steady_clock::now() + period), woke_(due_ - period) {
   ::prctl(PR_SET_TIMERSLACK, 1UL);
 }
 
 int PeriodicTimer::wait(TickStats& stats) noexcept {
-  const SteadyTime wakes_at = due_ - margin_.value();
-  const auto sleep_until = wakes_at.time_since_epoch();
+  const auto sleep_until = (due_ - spin_).time_since_epoch();
   const auto seconds = std::chrono::duration_cast<std::chrono::seconds>(sleep_until);
   const timespec when{static_cast<time_t>(seconds.count()),
                       static_cast<long>(std::chrono::nanoseconds(sleep_until - seconds).count())};
-  const bool sleeps = std::chrono::steady_clock::now() < wakes_at;  // false after work that took too long
   while (::clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &when, nullptr) != 0) {
   }
-  if (sleeps) margin_.woke(std::chrono::steady_clock::now() - wakes_at);
   do woke_ = std::chrono::steady_clock::now();
   while (woke_ < due_);
 

@@ -98,23 +98,6 @@ TEST(DurationHistogram, TellsWhatCameLater) {
   EXPECT_NEAR(later.work.percentile_us(1), 5010.0, 0.03 * 5010.0);
 }
 
-TEST(WakeUpMargin, FollowsTheLatenessOfTheMachine) {
-  WakeUpMargin margin(150us);
-  EXPECT_EQ(margin.value(), 150us) << "nothing is known yet";
-  for (int i = 0; i < 10'000; ++i) margin.woke(8us);
-  EXPECT_EQ(margin.value(), 10us);
-  margin.woke(40us);
-  EXPECT_EQ(margin.value(), 50us) << "at once";
-  // 0.999^693 is a half.
-  for (int i = 0; i < 693; ++i) margin.woke(8us);
-  EXPECT_NEAR(static_cast<double>(margin.value().count()), 25'000.0, 50.0);
-  margin.woke(1s);
-  EXPECT_EQ(margin.value(), 150us) << "never more than the most";
-  WakeUpMargin none(0us);
-  none.woke(1ms);
-  EXPECT_EQ(none.value(), 0us);
-}
-
 TEST(PeriodicTimer, NeverTicksEarlyAndCountsWhatItMissed) {
   TickStats stats;
   const auto start = std::chrono::steady_clock::now();
