@@ -40,9 +40,12 @@ Result<Space> read(const ListeningOption& option, double rate_hz) {
   const Vec3 from_mm = vector(option.listener_mm, usual_listener_mm(*way));
   if (from_mm.norm() < 1e-6)
     return failure(ErrorCode::invalid_input, "--listener 0 0 0 is inside the bone, and looks nowhere; move it away");
+  const Vec3 up = vector(option.up, -Vec3::UnitY());
+  if (up.norm() < 1e-6)
+    return failure(ErrorCode::invalid_input, "--listener-up 0 0 0 is no direction; give one, such as 0 -1 0");
   Space space;
   space.listening = *way;
-  space.pose_bone_head = looking(from_mm, Vec3::Zero(), vector(option.up, -Vec3::UnitY()));
+  space.pose_bone_head = looking(from_mm, Vec3::Zero(), up);
   if (*way != Listening::headphones) return space;
   Result<Hrtf> hrtf = read_hrtf(option.hrtf, rate_hz);
   if (!hrtf) return tl::unexpected(hrtf.error());

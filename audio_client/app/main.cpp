@@ -16,6 +16,7 @@
 #include <string>
 #include <system_error>
 #include <thread>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -23,6 +24,7 @@
 #include "audio_client/app/devices_command.hpp"
 #include "audio_client/app/listening_option.hpp"
 #include "audio_client/app/model_command.hpp"
+#include "audio_client/app/output_file.hpp"
 #include "audio_client/app/preset_command.hpp"
 #include "audio_client/app/record_command.hpp"
 #include "audio_client/app/render_command.hpp"
@@ -197,19 +199,15 @@ class Window {
 
 // No file that is written is another one that is written, or a preset that is read.
 Result<void> check_outputs(const Options& options) {
-  const std::pair<const char*, std::filesystem::path> written[] = {
-      {"--wav", options.wav_file}, {"--state-log", options.state_log_file}, {"--summary", options.summary_file}};
-  std::vector<std::pair<std::string, std::filesystem::path>> known;
-  for (const std::string& preset : options.presets) known.emplace_back("--preset", preset);
-  for (const auto& [option, file] : written) {
-    if (file.empty()) continue;
-    std::error_code ignored;
-    const std::filesystem::path place = std::filesystem::weakly_canonical(file, ignored);
-    for (const auto& [other, there] : known)
-      if (std::filesystem::weakly_canonical(there, ignored) == place)
-        return failure(ErrorCode::invalid_input,
-                       std::string(option) + " and " + other + " are one file, " + file.string() + "; name two");
-    known.emplace_back(option, file);
+  std::vector<audio::OtherFile> others;
+  for (const std::string& preset : options.presets) others.push_back({preset, "a preset"});
+  const std::tuple<const char*, std::filesystem::path, const char*> written[] = {
+      {"--wav", options.wav_file, "the recording"},
+      {"--state-log", options.state_log_file, "the state log"},
+      {"--summary", options.summary_file, "the summary"}};
+  for (const auto& [option, file, what] : written) {
+    if (Result<void> apart = audio::check_apart(file.string(), option, others); !apart) return apart;
+    others.push_back({file.string(), what});
   }
   return {};
 }

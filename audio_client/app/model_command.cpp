@@ -25,9 +25,9 @@ struct ModelArguments {
 
 Result<std::string> run_model(const ModelArguments& a) {
   // What would be found after the work is found before it.
-  if (auto usable = check_output(a.out, "the model", "--out", {a.recording.file}); !usable)
+  if (auto usable = check_output(a.out, "the model", "--out", {{a.recording.file}}); !usable)
     return tl::unexpected(usable.error());
-  if (auto usable = check_output(a.play, "the sound", "--play", {a.recording.file, a.out}); !usable)
+  if (auto usable = check_output(a.play, "the sound", "--play", {{a.recording.file}, {a.out, "the model"}}); !usable)
     return tl::unexpected(usable.error());
   const auto recording = read(a.recording);
   if (!recording) return tl::unexpected(recording.error());
@@ -51,7 +51,8 @@ struct ResynthesiseArguments {
 };
 
 Result<std::string> run_resynthesis(const ResynthesiseArguments& a) {
-  if (auto usable = check_output(a.out, "the sound", "OUT", {a.model}); !usable) return tl::unexpected(usable.error());
+  if (auto usable = check_output(a.out, "the sound", "OUT", {{a.model}}); !usable)
+    return tl::unexpected(usable.error());
   const auto model = read_model(a.model);
   if (!model) return tl::unexpected(model.error());
   const std::vector<float> sound = sound::resynthesised(*model, a.seed);

@@ -7,17 +7,25 @@
 
 namespace osteon::audio {
 
-Result<void> check_output(const std::string& file, const std::string& what, const std::string& option,
-                          const std::vector<std::string>& others) {
+namespace fs = std::filesystem;
+
+Result<void> check_apart(const std::string& file, const std::string& option, const std::vector<OtherFile>& others) {
   if (file.empty()) return {};
   std::error_code ignored;
-  if (std::filesystem::is_other(file, ignored))
+  const fs::path place = fs::weakly_canonical(file, ignored);
+  for (const OtherFile& other : others)
+    if (!other.file.empty() && place == fs::weakly_canonical(other.file, ignored))
+      return bad_input(file + " would lose " + other.what + "; give " + option + " another file");
+  return {};
+}
+
+Result<void> check_output(const std::string& file, const std::string& what, const std::string& option,
+                          const std::vector<OtherFile>& others) {
+  if (file.empty()) return {};
+  std::error_code ignored;
+  if (fs::is_other(file, ignored))
     return bad_input("cannot write " + what + " " + file + ": it is a device or a pipe; give " + option + " a file");
-  for (const std::string& other : others)
-    if (!other.empty() &&
-        std::filesystem::weakly_canonical(file, ignored) == std::filesystem::weakly_canonical(other, ignored))
-      return bad_input(file + " would lose " + (other == others.front() ? "what is read" : "the model") + "; give " +
-                       option + " another file");
+  if (auto apart = check_apart(file, option, others); !apart) return apart;
   return check_writable(file, what, option);
 }
 

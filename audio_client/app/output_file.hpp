@@ -7,9 +7,18 @@
 
 namespace osteon::audio {
 
-// A file for `what` ("the model"), which is no other file of the same command. The first of `others` is what is read.
-// An empty name is always good. Error: invalid_input or internal; names file and option.
+// Another file of the same command.
+struct OtherFile {
+  std::string file, what = "what is read";
+};
+
+// Writing `file` loses none of `others`. An empty name is no file. Error invalid_input; names file and option.
+[[nodiscard]] Result<void> check_apart(const std::string& file, const std::string& option,
+                                       const std::vector<OtherFile>& others);
+
+// A file for `what` ("the model"): check_apart(), no device, and writable. An empty name is always good. Errors:
+// invalid_input or internal; name file and option.
 [[nodiscard]] Result<void> check_output(const std::string& file, const std::string& what, const std::string& option,
-                                        const std::vector<std::string>& others);
+                                        const std::vector<OtherFile>& others);
 
 }  // namespace osteon::audio

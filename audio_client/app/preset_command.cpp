@@ -7,6 +7,7 @@
 #include <memory>
 #include <utility>
 
+#include "audio_client/app/output_file.hpp"
 #include "audio_client/app/recording_option.hpp"
 #include "audio_client/presets/preset_file.hpp"
 #include "audio_client/presets/recorded_preset.hpp"
@@ -49,12 +50,8 @@ Result<std::string> run_preset(const PresetArguments& a) {
     return bad_input("--tool \"" + bounded_text(a.tool, 60) +
                      "\" is no tool that sounds; give the name of a tool, or " + "one of " + kinds);
   }
-  std::error_code ignored;
-  if (std::filesystem::weakly_canonical(a.out, ignored) == std::filesystem::weakly_canonical(a.recording.file, ignored))
-    return bad_input(a.out + " would lose what is read; give --out another file");
-  if (std::filesystem::is_other(a.out, ignored))
-    return bad_input("cannot write the preset " + a.out + ": it is a device or a pipe; give --out a file");
-  if (auto usable = check_writable(a.out, "the preset", "--out"); !usable) return tl::unexpected(usable.error());
+  if (auto usable = check_output(a.out, "the preset", "--out", {{a.recording.file}}); !usable)
+    return tl::unexpected(usable.error());
   const auto recording = read(a.recording);
   if (!recording) return tl::unexpected(recording.error());
   RecordedParams params{.name = a.name.empty() ? std::filesystem::path(a.out).stem().string() : a.name,

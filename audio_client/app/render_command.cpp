@@ -44,10 +44,9 @@ std::string summary(const RenderArguments& a, const OfflineSound& sound, double 
 }
 
 Result<std::string> run_render(const RenderArguments& a) {
-  std::vector<std::string> read = a.presets;
-  read.push_back(a.record);
-  for (const std::string& one : read)
-    if (auto usable = check_output(a.out, "the sound", "--out", {one}); !usable) return tl::unexpected(usable.error());
+  std::vector<OtherFile> read{{a.record}};
+  for (const std::string& preset : a.presets) read.push_back({preset});
+  if (auto usable = check_output(a.out, "the sound", "--out", read); !usable) return tl::unexpected(usable.error());
   auto presets = presets_of(a.presets);
   if (!presets) return tl::unexpected(presets.error());
   auto record = open_states(a.record);

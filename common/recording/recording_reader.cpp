@@ -3,41 +3,10 @@
 #include <hdf5.h>
 
 #include <cmath>
-#include <type_traits>
+
+#include "common/recording/hdf5_type.hpp"
 
 namespace osteon {
-namespace {
-
-static_assert(std::is_same_v<hid_t, std::int64_t>);
-
-template <class T>
-hid_t native_type();
-template <>
-hid_t native_type<double>() {
-  return H5T_NATIVE_DOUBLE;
-}
-template <>
-hid_t native_type<float>() {
-  return H5T_NATIVE_FLOAT;
-}
-template <>
-hid_t native_type<std::uint8_t>() {
-  return H5T_NATIVE_UINT8;
-}
-template <>
-hid_t native_type<std::uint32_t>() {
-  return H5T_NATIVE_UINT32;
-}
-template <>
-hid_t native_type<std::uint64_t>() {
-  return H5T_NATIVE_UINT64;
-}
-template <>
-hid_t native_type<std::int64_t>() {
-  return H5T_NATIVE_INT64;
-}
-
-}  // namespace
 
 RecordingReader::RecordingReader(const std::filesystem::path& file)
     : path_(file), name_("the recording " + file.string()) {}
@@ -178,7 +147,7 @@ std::vector<T> RecordingReader::values(const char* path, std::size_t rows, std::
   }
   std::vector<T> read(rows * width);
   if (H5Sselect_hyperslab(space.id(), H5S_SELECT_SET, from, nullptr, count, nullptr) < 0 ||
-      H5Dread(dataset.id(), named ? stored.id() : native_type<T>(), memory.id(), space.id(), H5P_DEFAULT, read.data()) <
+      H5Dread(dataset.id(), named ? stored.id() : hdf5_type<T>(), memory.id(), space.id(), H5P_DEFAULT, read.data()) <
           0)
     damaged(path);
   return read;

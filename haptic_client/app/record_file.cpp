@@ -15,6 +15,7 @@
 #include "common/input/pointer_link.hpp"
 #include "common/mechanics/force_law.hpp"
 #include "common/recording/hdf5_handle.hpp"
+#include "common/recording/hdf5_type.hpp"
 #include "common/recording/recording_layout.hpp"
 
 namespace osteon::haptic {
@@ -103,33 +104,6 @@ struct Names {
   std::vector<std::pair<std::string, int>> values;
 };
 
-template <class T>
-hid_t native();
-template <>
-hid_t native<float>() {
-  return H5T_NATIVE_FLOAT;
-}
-template <>
-hid_t native<double>() {
-  return H5T_NATIVE_DOUBLE;
-}
-template <>
-hid_t native<std::int64_t>() {
-  return H5T_NATIVE_INT64;
-}
-template <>
-hid_t native<std::uint64_t>() {
-  return H5T_NATIVE_UINT64;
-}
-template <>
-hid_t native<std::uint32_t>() {
-  return H5T_NATIVE_UINT32;
-}
-template <>
-hid_t native<std::uint8_t>() {
-  return H5T_NATIVE_UINT8;
-}
-
 // An array that grows by rows, and its rows that are not written yet.
 template <class Row>
 struct Column {
@@ -156,7 +130,7 @@ Column<Row> column(const char* path, const char* units, const char* frame, const
   Column<Row> made;
   made.path = path, made.units = units, made.frame = frame, made.meaning = meaning;
   made.value_bytes = sizeof(T);
-  made.type_id = native<T>();
+  made.type_id = hdf5_type<T>();
   using Given = std::invoke_result_t<Get, const Row&>;
   if constexpr (std::is_arithmetic_v<Given>) {
     made.take = [get](const Row& row, std::vector<std::byte>& to) {

@@ -39,6 +39,31 @@ TEST(ToolStateLink, BlowsSurviveLoss) {
   EXPECT_LE(most_ms, 3 * 16 + 8);
 }
 
+// Away from the bone an effort, which names the tool, is rare. A broach that had more blows than the one before must
+// not come with its count under the old name: that would be heard as a blow.
+TEST(ToolStateLink, BlowsComeUnderTheNameOfTheirTool) {
+  LinkPair pair;
+  pair.run(1s);
+  CuttingState state;
+  state.phase = CuttingPhase::free;
+  int changes = 0;
+  std::string before;
+  for (int i = 0; i < 500; ++i) {
+    ++state.state_seq;
+    const bool first = i / 3 % 2 == 0;
+    state.tool_name = first ? "broach-1" : "broach-2";
+    state.blows = first ? 3 : 40;
+    pair.client.set_state(state, 0);
+    pair.run(4ms);
+    const auto received = pair.server.take_state();
+    if (!received) continue;
+    EXPECT_EQ(received->state.blows, received->state.tool_name == "broach-1" ? 3u : 40u);
+    changes += received->state.tool_name != before;
+    before = received->state.tool_name;
+  }
+  EXPECT_GT(changes, 20);
+}
+
 // Sound computes ahead from pairs of states: at the bone, the force of each must be of its time.
 TEST(ToolStateLink, AtTheBoneEachStateHasItsEffort) {
   LinkPair pair;
