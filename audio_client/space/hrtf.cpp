@@ -27,18 +27,37 @@ struct Separated {
 class Separator {
  public:
   explicit Separator(double rate_hz)
-      : fft_(kTransform), response_(fft_.bins()), minimum_(fft_.bins()), time_(kTransform), band_(fft_.bins()) {
+      : fft_(kTransform),
+        response_(fft_.bins()),
+        minimum_(fft_.bins()),
+        equaliser_(fft_.bins(), 1.0F),
+        time_(kTransform),
+        band_(fft_.bins()) {
     for (std::size_t k = 0; k < band_.size(); ++k)
       band_[k] =
           static_cast<float>(std::exp(-std::pow(static_cast<double>(k) * rate_hz / kTransform / kDelayBand_hz, 4)));
   }
 
-  // The folded cepstrum of the magnitudes gives the minimum phase (Oppenheim 1989). The delay is where the
-  // response and its own minimum-phase form are most alike.
+  // Takes out of later responses what all of these have in common: the canal and the outer ear, and the loudspeaker of
+  // the measurement. Headphones bring the first two themselves (Møller 1992).
+  void equalise(std::span<const HeadResponse> measured) {
+    std::vector<double> power(response_.size(), 0.0);
+    for (const HeadResponse& one : measured)
+      for (const std::span<const float> ear : {std::span(one.left), std::span(one.right)}) {
+        transform(ear);
+        for (std::size_t k = 0; k < power.size(); ++k) power[k] += std::norm(response_[k]);
+      }
+    const double most = *std::ranges::max_element(power);
+    if (most <= 0) return;
+    for (std::size_t k = 0; k < power.size(); ++k)
+      minimum_[k] = static_cast<float>(-0.5 * std::log(std::max(power[k] / most, double{kDeepest} * kDeepest)));
+    to_minimum_phase();
+    equaliser_ = minimum_;
+  }
+
+  // The delay is where the response and its own minimum-phase form are most alike.
   Separated separated(std::span<const float> response) {
-    std::ranges::fill(time_, 0.0F);
-    std::ranges::copy(response, time_.begin());
-    fft_.forward(time_, response_);
+    transform(response);
     float loudest = 0;
     for (const std::complex<float> line : response_) loudest = std::max(loudest, std::abs(line));
     Separated made;
@@ -48,21 +67,34 @@ class Separator {
     }
     for (std::size_t k = 0; k < response_.size(); ++k)
       minimum_[k] = std::log(std::max(std::abs(response_[k]), kDeepest * loudest));
-    fft_.inverse(minimum_, time_);
-    for (std::size_t n = 1; n < time_.size() / 2; ++n) time_[n] *= 2.0F;
-    std::fill(time_.begin() + kTransform / 2 + 1, time_.end(), 0.0F);
-    fft_.forward(time_, minimum_);
-    for (std::complex<float>& line : minimum_) line = std::exp(line);
+    to_minimum_phase();
+    made.delay_frames = delay();
+    for (std::size_t k = 0; k < minimum_.size(); ++k) minimum_[k] *= equaliser_[k];
     fft_.inverse(minimum_, time_);
     made.filter.assign(time_.begin(), time_.begin() + kEarTaps);
     for (int i = 0; i < kFade; ++i)
       made.filter[static_cast<std::size_t>(kEarTaps - kFade + i)] *=
           static_cast<float>(0.5 + 0.5 * std::cos(std::numbers::pi * (i + 1) / (kFade + 1)));
-    made.delay_frames = delay();
     return made;
   }
 
  private:
+  void transform(std::span<const float> response) {
+    std::ranges::fill(time_, 0.0F);
+    std::ranges::copy(response, time_.begin());
+    fft_.forward(time_, response_);
+  }
+
+  // minimum_, logarithms of magnitudes, becomes a spectrum of them with minimum phase, by the folded cepstrum
+  // (Oppenheim 1989).
+  void to_minimum_phase() {
+    fft_.inverse(minimum_, time_);
+    for (std::size_t n = 1; n < time_.size() / 2; ++n) time_[n] *= 2.0F;
+    std::fill(time_.begin() + kTransform / 2 + 1, time_.end(), 0.0F);
+    fft_.forward(time_, minimum_);
+    for (std::complex<float>& line : minimum_) line = std::exp(line);
+  }
+
   // The maximum of the correlation below kDelayBand_hz, on the parabola through three frames.
   double delay() {
     for (std::size_t k = 0; k < response_.size(); ++k) response_[k] *= std::conj(minimum_[k]) * band_[k];
@@ -77,7 +109,7 @@ class Separator {
   }
 
   sound::RealFft fft_;
-  std::vector<std::complex<float>> response_, minimum_;
+  std::vector<std::complex<float>> response_, minimum_, equaliser_;
   std::vector<float> time_, band_;
 };
 
@@ -153,8 +185,10 @@ Result<Hrtf> Hrtf::make(std::span<const HeadResponse> measured, double rate_hz) 
     if (!usable(one.left) || !usable(one.right))
       return failure(ErrorCode::invalid_input,
                      "a response is empty, not finite, or longer than " + std::to_string(kMostTaps) + " samples");
-    parts.push_back({one.towards.normalized(), separator.separated(one.left), separator.separated(one.right)});
   }
+  separator.equalise(measured);
+  for (const HeadResponse& one : measured)
+    parts.push_back({one.towards.normalized(), separator.separated(one.left), separator.separated(one.right)});
   Hrtf made;
   for (int e = 0; e < kElevations; ++e) {
     for (int a = 0; a < kAzimuths; ++a) {

@@ -16,6 +16,7 @@
 #include "common/sound/levels.hpp"
 #include "tests/support/allocation_counter.hpp"
 #include "tests/unit/audio_client/ideal_head.hpp"
+#include "tests/unit/audio_client/played_tools.hpp"
 #include "tests/unit/audio_client/scripted_drilling.hpp"
 
 namespace osteon::audio {
@@ -137,6 +138,31 @@ TEST_P(StereoSynth, FallsSilentAfterTheLastSoundHasArrived) {
   EXPECT_GT(sound::peak(after.left), 1e-3) << "it runs down";
   EXPECT_EQ(sound::peak(std::span(after.left).last(4800)), 0);
   EXPECT_EQ(sound::peak(std::span(after.right).last(4800)), 0);
+}
+
+// 8.5.4: perforation is the loudest moment. A head makes the ear's frequencies louder, and the limiter must leave that.
+TEST_P(StereoSynth, PerforationIsTheLoudestMoment) {
+  SynthParams params = params_in(GetParam());
+  if (GetParam() == Listening::headphones) {
+    auto kemar = read_hrtf({}, kRate_hz);
+    ASSERT_TRUE(kemar) << kemar.error().message;
+    params.space.hrtf = std::make_shared<const Hrtf>(std::move(*kemar));
+  }
+  DrillSynth synth;
+  synth.prepare(params);
+  const auto level_db = [&](const ToolSound& tool, double seconds) {
+    const Sides sides = played(synth, {tool}, seconds);
+    const std::size_t end = std::min<std::size_t>(sides.left.size(), 4800);
+    const double left_db = sound::rms_db(std::span(sides.left).last(end)),
+                 right_db = sound::rms_db(std::span(sides.right).last(end));
+    return std::max(left_db, right_db);
+  };
+  static_cast<void>(level_db(test::free_tool(), 0.75));
+  const double cortical_db = level_db(test::cortical_tool(), 1.0);
+  ToolSound plunge = test::free_tool();
+  plunge.advancing = true;
+  plunge.load = 0.02;
+  EXPECT_GT(level_db(plunge, 0.1), cortical_db + 3.0) << "3 dB are an obvious difference (8.6.3)";
 }
 
 // A broach is silent between its blows. Where it was at the last one does not count.
