@@ -195,22 +195,21 @@ TEST(SofaFile, NumbersThatAreNotThoseOfTheDataAreRefused) {
   const test::TempDir temp;
   const std::string whole = test::content("/usr/share/libmysofa/MIT_KEMAR_normal_pinna.sofa");
   ASSERT_FALSE(whole.empty());
-  // Every number 710 of 8 bytes could be that of the directions, and every 512 that of the samples.
-  int refused = 0;
+  // A number 710 of 8 bytes is that of the directions, and a 512 that of the samples. Others of them change nothing
+  // here.
   for (const auto& [number, other] : {std::pair<std::uint64_t, std::uint64_t>{710, 9999}, {512, 1000}}) {
     const std::string_view was(reinterpret_cast<const char*>(&number), sizeof number);
-    for (std::size_t at = whole.find(was); at != std::string::npos; at = whole.find(was, at + 1)) {
+    bool refused = false;
+    for (std::size_t at = whole.find(was); at != std::string::npos && !refused; at = whole.find(was, at + 1)) {
       std::string damaged = whole;
       std::memcpy(damaged.data() + at, &other, sizeof other);
       ASSERT_TRUE(write_file(temp / "damaged.sofa", damaged));
       const auto read = read_hrtf(temp / "damaged.sofa", 48000);
-      refused += !read;
-      if (!read) {
-        EXPECT_THAT(read.error().message, testing::HasSubstr("damaged.sofa"));
-      }
+      refused = !read && read.error().message.find("are not those of its data") != std::string::npos &&
+                read.error().message.find("damaged.sofa") != std::string::npos;
     }
+    EXPECT_TRUE(refused) << number;
   }
-  EXPECT_GT(refused, 0);
 }
 
 TEST(SofaFile, WhatIsNoHeadIsOneSentence) {
