@@ -323,7 +323,7 @@ MUTATIONS = [
       "nothing is heard of a breakthrough", "unit.audio_client", "NiuDrilling.*"),
     M("audio_client/synth/voice.cpp", "partial.ratio * from_turns + offset_[i]", "from_turns + offset_[i]",
       "partials are no orders of one phase", "unit.audio_client", "SpindlePhase.*"),
-    M("audio_client/synth/spindle_motor.cpp", "rpm + spindle_.unloaded_rpm - spindle_.rpm", "rpm",
+    M("audio_client/synth/spindle_motor.cpp", ": spindle_.unloaded_rpm - spindle_.rpm)", ": 0.0)",
       "a load is counted twice", "unit.audio_client", "SpindleMotor.*"),
     M("audio_client/synth/handpiece.cpp", "std::lerp(applied_change(soft.change_db[s])",
       "std::lerp((soft.change_db[s])",

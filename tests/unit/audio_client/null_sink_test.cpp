@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <poll.h>
 
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <cmath>
@@ -10,6 +11,7 @@
 #include <cstdlib>
 #include <mutex>
 #include <numbers>
+#include <optional>
 #include <span>
 #include <string>
 #include <thread>
@@ -29,6 +31,13 @@ namespace {
 
 using namespace std::chrono_literals;
 using Clock = std::chrono::steady_clock;
+
+constexpr std::size_t kTone = 20000;  // frames in which a tone is measured
+constexpr const char* kAlwaysGaps = "the machine's sound has gaps all the time";
+
+struct Channels {
+  std::vector<float> left, right;
+};
 
 // Records both channels of the sink's monitor, and when each block arrived.
 class Monitor {
@@ -51,9 +60,11 @@ class Monitor {
     const std::lock_guard lock(mutex_);
     return left_;
   }
-  [[nodiscard]] std::vector<float> right() {
+  // The newest `count` samples of both channels.
+  [[nodiscard]] Channels last(std::size_t count) {
     const std::lock_guard lock(mutex_);
-    return right_;
+    const auto back = static_cast<std::ptrdiff_t>(std::min(count, left_.size()));
+    return {{left_.end() - back, left_.end()}, {right_.end() - back, right_.end()}};
   }
   [[nodiscard]] Clock::time_point arrival(std::size_t sample) {
     const std::lock_guard lock(mutex_);
@@ -107,6 +118,18 @@ bool has_gap(std::span<const float> sound) {
   return false;
 }
 
+// Waits until the monitor has `count` new samples without a gap.
+std::optional<Channels> gapless(Monitor& monitor, std::size_t count) {
+  constexpr int kTries = 60;
+  for (int tries = 0; tries < kTries; ++tries) {
+    const std::size_t until = monitor.size() + count;
+    if (!test::wait_until([&] { return monitor.size() > until; }, 30s)) return std::nullopt;
+    Channels heard = monitor.last(count);
+    if (!has_gap(heard.left) && !has_gap(heard.right)) return heard;
+  }
+  return std::nullopt;
+}
+
 // Silence until the test starts it, then a sine whose first sample is already loud, so that its arrival is sharp.
 struct ToneSource final : SoundSource {
   std::atomic<bool> on{false};
@@ -136,22 +159,25 @@ TEST(PulseOutput, RenderedToneArrivesAtTheSink) {
   ASSERT_TRUE(test::wait_until([&] { return source.frames > 96000 && monitor.size() > 48000; }, 30s));
   source.on = true;
   const std::size_t before = monitor.size();
-  ASSERT_TRUE(test::wait_until([&] { return monitor.size() > before + 96000; }, 30s));
+  std::size_t first = before;
+  ASSERT_TRUE(test::wait_until(
+      [&] {
+        const std::vector<float> left = monitor.left();
+        while (first < left.size() && left[first] == 0) ++first;
+        return first < left.size();
+      },
+      30s))
+      << "nothing arrived";
+  const std::optional<Channels> heard = gapless(monitor, kTone);
   (*output)->stop();
   EXPECT_EQ((*output)->failure_reason(), "");
 
-  const std::vector<float> left = monitor.left();
-  std::size_t first = before;
-  while (first < left.size() && left[first] == 0) ++first;
-  ASSERT_LT(first + 24000, left.size()) << "nothing arrived";
-  const std::span<const float> tone = std::span(left).subspan(first + 1000, 20000);
-  const sound::Tone heard = sound::find_tone(tone, 48000, 900, 1100);
-  EXPECT_NEAR(heard.hz, 1000, 1);
-  EXPECT_NEAR(heard.level_db, 20 * std::log10(0.5), 1.0);
-  const std::vector<float> right = monitor.right();
-  const std::span<const float> other = std::span(right).subspan(first + 1000, 20000);
-  EXPECT_NEAR(sound::find_tone(other, 48000, 1400, 1600).level_db, 20 * std::log10(0.25), 1.0);
-  EXPECT_LT(sound::tone_db(other, 48000, 1000), -60) << "the channels are apart";
+  ASSERT_TRUE(heard) << kAlwaysGaps;
+  const sound::Tone left = sound::find_tone(heard->left, 48000, 900, 1100);
+  EXPECT_NEAR(left.hz, 1000, 1);
+  EXPECT_NEAR(left.level_db, 20 * std::log10(0.5), 1.0);
+  EXPECT_NEAR(sound::find_tone(heard->right, 48000, 1400, 1600).level_db, 20 * std::log10(0.25), 1.0);
+  EXPECT_LT(sound::tone_db(heard->right, 48000, 1000), -60) << "the channels are apart";
 
   const double took_ms = std::chrono::duration<double, std::milli>(monitor.arrival(first).time_since_epoch()).count() -
                          static_cast<double>(source.started_ns) / 1e6;
@@ -191,25 +217,19 @@ TEST(PulseOutput, DrillIsHeardThroughTheServer) {
   state.state_seq = 9;
   engine.deliver(sound_scene(std::span(&state, 1), Clock::now().time_since_epoch().count()));
   // One second of running is far past the run-up. The sink's own clock is the machine's.
-  constexpr std::size_t kRunUp = 56000, kAcknowledged = 40000;
-  constexpr int kTries = 40;
-  std::vector<float> left;
-  std::size_t until = monitor.size() + kRunUp;
-  for (int tries = 0; left.empty() || has_gap(std::span(left).last(kAcknowledged)); ++tries) {
-    ASSERT_LT(tries, kTries) << "the machine's sound has gaps all the time";
-    const std::uint64_t gaps = (*output)->gaps();
-    until += kAcknowledged;
-    ASSERT_TRUE(test::wait_until([&] { return monitor.size() > until; }, 30s));
-    if ((*output)->gaps() == gaps) left = monitor.left();
-  }
+  constexpr std::size_t kRunUp = 56000, kMeasured = 40000;
+  const std::size_t running = monitor.size() + kRunUp;
+  ASSERT_TRUE(test::wait_until([&] { return monitor.size() > running; }, 30s));
+  const std::optional<Channels> heard = gapless(monitor, kMeasured);
   (*output)->stop();
 
   Sounded sounded;
   ASSERT_TRUE(engine.next_sounded(sounded));
   EXPECT_EQ(sounded.state_seq, 9U);
   EXPECT_GE(sounded.rendered_ns, sounded.received_ns);
+  ASSERT_TRUE(heard) << kAlwaysGaps;
   const double mesh_hz = 48 * 1200 / 60.0;
-  const sound::Tone mesh = sound::find_tone(std::span(left).last(kAcknowledged), 48000, mesh_hz - 20, mesh_hz + 20);
+  const sound::Tone mesh = sound::find_tone(heard->left, 48000, mesh_hz - 20, mesh_hz + 20);
   EXPECT_NEAR(mesh.hz, mesh_hz, 1);
   EXPECT_GT(mesh.level_db, -45);
 }
@@ -254,9 +274,10 @@ TEST(RestartedServer, IsPlayedToAgain) {
   source.on = true;
   Monitor monitor;
   ASSERT_TRUE(test::wait_until([&] { return source.frames > before + 96000 && monitor.size() > 48000; }, 60s));
+  const std::optional<Channels> heard = gapless(monitor, kTone);
   output.stop();
-  const std::vector<float> left = monitor.left();
-  EXPECT_NEAR(sound::find_tone(std::span(left).last(24000), 48000, 900, 1100).level_db, 20 * std::log10(0.5), 1.0);
+  ASSERT_TRUE(heard) << kAlwaysGaps;
+  EXPECT_NEAR(sound::find_tone(heard->left, 48000, 900, 1100).level_db, 20 * std::log10(0.5), 1.0);
 }
 
 }  // namespace
