@@ -977,8 +977,8 @@
         <translation>osteon-audio ist nicht installiert. Installieren Sie das Paket osteon.</translation>
     </message>
     <message>
-        <source>Another window has this session open. Close it there first.</source>
-        <translation>Ein anderes Fenster hat diese Sitzung. Schließen Sie sie erst dort.</translation>
+        <source>Another window has this session open. Close it there, or wait until it has ended.</source>
+        <translation>Die Sitzung ist in einem anderen Fenster offen. Schließen Sie es, oder warten Sie.</translation>
     </message>
     <message>
         <source>%1 was ended by force or crashed.</source>
