@@ -47,7 +47,7 @@ TEST_F(PadTest, APadDrillsRumblesUndoesAndLetsGoWhenItIsUnplugged) {
 
   // The left stick brings the tool onto the bone, and moves it to the picture's right: seen from above, with the face
   // upward, that is the patient's right, -x.
-  PadState hand;
+  GamePadState hand;
   hand.left.x() = 1.0;
   plug_->hold(hand);
   ASSERT_TRUE(until([&] { return pointer.on_bone(); })) << problem();
@@ -64,7 +64,7 @@ TEST_F(PadTest, APadDrillsRumblesUndoesAndLetsGoWhenItIsUnplugged) {
   hand.right_trigger = 0.8;
   plug_->hold(hand);
   ASSERT_TRUE(until([&] { return pointer.pushing(); })) << problem();
-  constexpr double kPulled = PadControl::kTriggerPulled;
+  constexpr double kPulled = GamePadMapping::kTriggerPulled;
   EXPECT_NEAR(pointer.push_n(), 1.0 + 39.0 * (0.8 - kPulled) / (1.0 - kPulled), 0.01);
   ASSERT_TRUE(until([&] { return cut(); })) << problem();
   EXPECT_TRUE(until([&] { return !plug_->quiet(); }));

@@ -270,16 +270,16 @@ TEST_F(WindowTest, ADragWithoutAToolTurnsTheBone) {
 }
 
 // A view is kept, left, and taken again.
-TEST_F(WindowTest, AKeptViewComesBack) {
+TEST_F(WindowTest, ASavedViewComesBack) {
   open();
   const CameraView kept = view_->camera();
-  trigger("keep_view");
+  trigger("save_view");
   trigger("back");
   ASSERT_GT((view_->camera().eye_mm - kept.eye_mm).norm(), 10.0);
   trigger("view_1");
   EXPECT_LT((view_->camera().eye_mm - kept.eye_mm).norm(), 1e-6);
   EXPECT_LT((view_->camera().up - kept.up).norm(), 1e-6);
-  trigger("forget_views");
+  trigger("delete_views");
   EXPECT_FALSE(window_->findChild<QAction*>("view_1")->isVisible());
 }
 

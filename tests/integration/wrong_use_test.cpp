@@ -45,8 +45,8 @@
 #include "tests/support/process.hpp"
 #include "tests/support/size_limit.hpp"
 #include "viewer_client/desktop/language.hpp"
-#include "viewer_client/desktop/leftovers.hpp"
 #include "viewer_client/desktop/sound_dialog.hpp"
+#include "viewer_client/desktop/stale_files.hpp"
 
 namespace osteon {
 namespace {

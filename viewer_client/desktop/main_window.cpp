@@ -36,8 +36,8 @@
 #include "viewer_client/desktop/clipping_panel.hpp"
 #include "viewer_client/desktop/connection_panel.hpp"
 #include "viewer_client/desktop/force_menu.hpp"
+#include "viewer_client/desktop/game_pad_controller.hpp"
 #include "viewer_client/desktop/gauges_panel.hpp"
-#include "viewer_client/desktop/pad_hand.hpp"
 #include "viewer_client/desktop/properties_panel.hpp"
 #include "viewer_client/desktop/risk_gauge.hpp"
 #include "viewer_client/desktop/sound_control.hpp"
@@ -83,7 +83,7 @@ MainWindow::MainWindow() {
   resize(1280, 800);
   setAcceptDrops(true);
   sockets_ = QStandardPaths::writableLocation(QStandardPaths::RuntimeLocation).toStdString();
-  leftovers_ = std::make_unique<Leftovers>(sockets_);
+  stale_files_ = std::make_unique<StaleFiles>(sockets_);
   pages_ = new QStackedWidget;
   start_ = new StartPage({[this](const ExampleBone& bone) { open_example(bone); },
                           [this](const RecentEntry& entry) { practise(entry.bone, entry.session); },
@@ -368,8 +368,9 @@ void MainWindow::show_joined(const WatchedRoom& room) {
   cap_timer_.start(kCapPeriod_ms);
   if (pointer_) pointer_timer_.start(kPointerPeriod_ms);
   if (!pad_)
-    pad_ = std::make_unique<PadHand>(*view_, PadHand::Events{[this](const QString& sentence) { say(sentence); },
-                                                             [this] { findChild<QAction*>("undo")->trigger(); }});
+    pad_ = std::make_unique<GamePadController>(
+        *view_, GamePadController::Events{[this](const QString& sentence) { say(sentence); },
+                                          [this] { findChild<QAction*>("undo")->trigger(); }});
   if (opened_) remember(*opened_);
   made_anew_.clear();
   view_->setFocus();
@@ -560,7 +561,7 @@ TourStep MainWindow::next_step() const {
 
 void MainWindow::follow_pad() {
   if (!pad_) return;
-  PadFeel feel;
+  RumbleInput feel;
   const std::optional<PointerOutput> hand = pointer_ ? pointer_->newest() : std::nullopt;
   // A force of before says nothing of now: the haptic client may hang, or the room be away.
   constexpr std::chrono::milliseconds kFresh{60};

@@ -58,7 +58,7 @@ void VirtualPad::unplug() {
     if (SDL_JoystickGetDeviceInstanceID(i) == instance_) return (void)SDL_JoystickDetachVirtual(i);
 }
 
-void VirtualPad::hold(const PadState& state) {
+void VirtualPad::hold(const GamePadState& state) {
   auto* joystick = static_cast<SDL_Joystick*>(joystick_);
   const auto axis = [&](int which, double share) { SDL_JoystickSetVirtualAxis(joystick, which, raw(share)); };
   axis(SDL_CONTROLLER_AXIS_LEFTX, state.left.x());

@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "viewer_client/pad/pad_control.hpp"
+#include "viewer_client/pad/game_pad_mapping.hpp"
 
 namespace osteon::test {
 
@@ -16,7 +16,7 @@ class VirtualPad {
   [[nodiscard]] bool plug_in();
   void unplug();
   // Holds the controls so from SDL's next look on. The right shoulder button stands for both.
-  void hold(const PadState& state);
+  void hold(const GamePadState& state);
   struct Motors {
     std::uint16_t low = 0, high = 0;  // as SDL asks for them
   };

@@ -249,6 +249,21 @@
     </message>
 </context>
 <context>
+    <name>GamePadController</name>
+    <message>
+        <source>The game pad</source>
+        <translation>Das Gamepad</translation>
+    </message>
+    <message>
+        <source>%1: choose a tool. The left stick moves it, the right trigger pushes.</source>
+        <translation>%1: Wählen Sie ein Werkzeug. Linker Stick bewegt es, rechter Trigger drückt.</translation>
+    </message>
+    <message>
+        <source>%1 was unplugged. It no longer leads the tool.</source>
+        <translation>%1 ist nicht mehr angeschlossen. Es führt das Werkzeug nicht mehr.</translation>
+    </message>
+</context>
+<context>
     <name>GaugesPanel</name>
     <message>
         <source>Push</source>
@@ -929,21 +944,6 @@
     <message>
         <source>The haptic client starts again to show force in this way.</source>
         <translation>Das Haptikprogramm startet neu, um die Kraft so zu zeigen.</translation>
-    </message>
-</context>
-<context>
-    <name>PadHand</name>
-    <message>
-        <source>The game pad</source>
-        <translation>Das Gamepad</translation>
-    </message>
-    <message>
-        <source>%1: choose a tool. The left stick moves it, the right trigger pushes.</source>
-        <translation>%1: Wählen Sie ein Werkzeug. Linker Stick bewegt es, rechter Trigger drückt.</translation>
-    </message>
-    <message>
-        <source>%1 was unplugged. It no longer leads the tool.</source>
-        <translation>%1 ist nicht mehr angeschlossen. Es führt das Werkzeug nicht mehr.</translation>
     </message>
 </context>
 <context>

@@ -1,4 +1,4 @@
-#include "viewer_client/desktop/pad_hand.hpp"
+#include "viewer_client/desktop/game_pad_controller.hpp"
 
 #include <algorithm>
 #include <utility>
@@ -14,9 +14,11 @@ constexpr double kLongestTick_s = 0.1;  // a window that was busy does not throw
 
 }  // namespace
 
-PadHand::PadHand(BoneView& view, Events events) : view_(view), events_(std::move(events)) { ticked_.start(); }
+GamePadController::GamePadController(BoneView& view, Events events) : view_(view), events_(std::move(events)) {
+  ticked_.start();
+}
 
-void PadHand::tick(bool may_act, const PadFeel& feel) {
+void GamePadController::tick(bool may_act, const RumbleInput& feel) {
   const double dt_s = std::min(kLongestTick_s, 1e-3 * static_cast<double>(ticked_.restart()));
   if (!pad_.is_open()) {
     if (looked_.isValid() && looked_.elapsed() < kLookAgain_ms) return;
@@ -25,27 +27,27 @@ void PadHand::tick(bool may_act, const PadFeel& feel) {
   const GamePad::Change change = pad_.poll();
   const QString name = pad_.name().empty() ? tr("The game pad") : QString::fromStdString(pad_.name());
   if (change == GamePad::Change::opened) {
-    control_ = PadControl();
+    mapping_ = GamePadMapping();
     events_.said(tr("%1: choose a tool. The left stick moves it, the right trigger pushes.").arg(name));
   } else if (change == GamePad::Change::lost) {
-    let_go();
+    release_all();
     events_.said(tr("%1 was unplugged. It no longer leads the tool.").arg(name));
   }
   if (!pad_.is_open()) return;
   if (!may_act) return rest();
-  const PadOrder order = control_.step(pad_.state());
-  view_.follow_pad(order, dt_s);
-  if (order.undoes) events_.undo();
+  const GamePadCommand command = mapping_.step(pad_.state());
+  view_.follow_pad(command, dt_s);
+  if (command.undoes) events_.undo();
   pad_.rumble(rumble_of(feel.force_n, feel.most_n, feel.cuts));
 }
 
-void PadHand::rest() {
-  let_go();
+void GamePadController::rest() {
+  release_all();
   pad_.rumble({});
 }
 
-void PadHand::let_go() {
-  view_.follow_pad(control_.let_go(), 0.0);
+void GamePadController::release_all() {
+  view_.follow_pad(mapping_.release_all(), 0.0);
   view_.pad_gone();
 }
 
