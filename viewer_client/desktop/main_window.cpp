@@ -29,6 +29,7 @@
 #include <algorithm>
 #include <cmath>
 #include <initializer_list>
+#include <span>
 #include <utility>
 
 #include "common/tools/tool.hpp"
@@ -598,7 +599,7 @@ void MainWindow::refresh_gauges() {
     position_->clear();
   }
   risk_->set_plan(updater != nullptr ? updater->plan() : nullptr);
-  risk_->show_tip(held != nullptr ? std::optional(held->pose_bone_tool.position_mm) : std::nullopt);
+  risk_->show_tools(updater != nullptr ? updater->states() : std::span<const CuttingState>());
   if (const QString fault = QString::fromStdString(view_->take_plan_fault()); !fault.isEmpty()) say(fault);
   if (pointer_)
     device_->setText(!pointer_->connected() ? tr("The pointer's device is away")
