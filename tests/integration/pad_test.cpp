@@ -70,7 +70,8 @@ TEST_F(PadTest, APadDrillsRumblesUndoesAndLetsGoWhenItIsUnplugged) {
   EXPECT_TRUE(until([&] { return !plug_->quiet(); }));
   // 30 N are the device's, so 20 N or more are √(2/3) of the motor.
   EXPECT_TRUE(until([&] {
-    return std::ranges::any_of(plug_->heard(), [](const auto& motors) { return motors.low > 0.8 * 65535; });
+    const auto heard = plug_->heard();
+    return std::ranges::any_of(heard, [](const auto& motors) { return motors.low > 0.8 * 65535; });
   }));
 
   // Let go, the tool comes out and the motors rest. The wheel's push is back.

@@ -9,7 +9,6 @@ namespace osteon {
 
 namespace {
 
-constexpr qint64 kLookAgain_ms = 1000;
 constexpr double kLongestTick_s = 0.1;  // a window that was busy does not throw the tool far away
 
 }  // namespace
@@ -20,22 +19,19 @@ GamePadController::GamePadController(BoneView& view, Events events) : view_(view
 
 void GamePadController::tick(bool may_act, const RumbleInput& feel) {
   const double dt_s = std::min(kLongestTick_s, 1e-3 * static_cast<double>(ticked_.restart()));
-  if (!pad_.is_open()) {
-    if (looked_.isValid() && looked_.elapsed() < kLookAgain_ms) return;
-    looked_.start();
-  }
-  const GamePad::Change change = pad_.poll();
-  const QString name = pad_.name().empty() ? tr("The game pad") : QString::fromStdString(pad_.name());
-  if (change == GamePad::Change::opened) {
-    mapping_ = GamePadMapping();
-    events_.said(tr("%1: choose a tool. The left stick moves it, the right trigger pushes.").arg(name));
-  } else if (change == GamePad::Change::lost) {
+  const GamePadReading read = pad_.take();
+  const QString name = read.name.empty() ? tr("The game pad") : QString::fromStdString(read.name);
+  if (read.lost) {
     release_all();
     events_.said(tr("%1 was unplugged. It no longer leads the tool.").arg(name));
   }
-  if (!pad_.is_open()) return;
+  if (read.opened) {
+    mapping_ = GamePadMapping();
+    events_.said(tr("%1: choose a tool. The left stick moves it, the right trigger pushes.").arg(name));
+  }
+  if (!read.is_open) return;
   if (!may_act) return rest();
-  const GamePadCommand command = mapping_.step(pad_.state());
+  const GamePadCommand command = mapping_.step(read.state);
   view_.follow_pad(command, dt_s);
   if (command.undoes) events_.undo();
   pad_.rumble(rumble_of(feel.force_n, feel.most_n, feel.cuts));

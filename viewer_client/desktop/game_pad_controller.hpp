@@ -4,8 +4,8 @@
 #include <QElapsedTimer>
 #include <functional>
 
-#include "viewer_client/pad/game_pad.hpp"
 #include "viewer_client/pad/game_pad_mapping.hpp"
+#include "viewer_client/pad/game_pad_reader.hpp"
 
 namespace osteon {
 
@@ -30,8 +30,8 @@ class GamePadController {
 
   GamePadController(BoneView& view, Events events);
 
-  // Reads the pad, moves the tool and sets the motors. Call it at the rate at which the pad is to be read. Without a
-  // pad it only looks for one, once a second. `may_act`: this window is in front. Otherwise it does what rest() does.
+  // Takes what was read of the pad, moves the tool and sets the motors. Call it once a frame. `may_act`: this window is
+  // in front. Otherwise it does what rest() does.
   void tick(bool may_act, const RumbleInput& feel);
   // For a pause between ticks: releases all controls and stops the motors.
   void rest();
@@ -41,9 +41,9 @@ class GamePadController {
 
   BoneView& view_;
   Events events_;
-  GamePad pad_;
+  GamePadReader pad_;
   GamePadMapping mapping_;
-  QElapsedTimer ticked_, looked_;
+  QElapsedTimer ticked_;
 };
 
 }  // namespace osteon

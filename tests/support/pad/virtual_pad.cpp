@@ -37,7 +37,9 @@ bool VirtualPad::plug_in() {
   pad.name = "Virtual Pad";
   pad.userdata = this;
   pad.Rumble = [](void* self, Uint16 low, Uint16 high) {
-    static_cast<VirtualPad*>(self)->heard_.push_back({low, high});
+    auto& pad = *static_cast<VirtualPad*>(self);
+    const std::lock_guard lock(pad.mutex_);
+    pad.heard_.push_back({low, high});
     return 0;
   };
   const int index = SDL_JoystickAttachVirtualEx(&pad);
@@ -49,6 +51,19 @@ bool VirtualPad::plug_in() {
   hold({});
   return true;
 }
+
+std::vector<VirtualPad::Motors> VirtualPad::heard() const {
+  const std::lock_guard lock(mutex_);
+  return heard_;
+}
+
+bool VirtualPad::quiet() const {
+  const std::lock_guard lock(mutex_);
+  return heard_.empty() || (heard_.back().low == 0 && heard_.back().high == 0);
+}
+
+void VirtualPad::lock_sdl() { SDL_LockJoysticks(); }
+void VirtualPad::unlock_sdl() { SDL_UnlockJoysticks(); }
 
 void VirtualPad::unplug() {
   if (joystick_ == nullptr) return;
