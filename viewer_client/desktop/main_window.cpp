@@ -36,6 +36,7 @@
 #include "viewer_client/desktop/bone_view.hpp"
 #include "viewer_client/desktop/clipping_panel.hpp"
 #include "viewer_client/desktop/connection_panel.hpp"
+#include "viewer_client/desktop/enabled.hpp"
 #include "viewer_client/desktop/force_menu.hpp"
 #include "viewer_client/desktop/game_pad_controller.hpp"
 #include "viewer_client/desktop/gauges_panel.hpp"
@@ -191,14 +192,16 @@ void MainWindow::make_status() {
 }
 
 void MainWindow::enable_room_actions(bool on) {
-  for (QAction* action : room_actions_) action->setEnabled(on);
-  tools_->setEnabled(on && !watching_);
-  for (QDockWidget* panel : findChildren<QDockWidget*>())
-    panel->setEnabled(on || panel->objectName() == "connection_panel");  // it says why there is no room
+  const QString no_room = tr("Open a bone or join a room first."), watches = tr("You only watch this room.");
+  for (QAction* action : room_actions_) set_enabled(*action, on, no_room);
+  tools_->set_tools_enabled(on && !watching_, on ? watches : no_room);
+  for (QDockWidget* panel : findChildren<QDockWidget*>())  // that of the connections says why there is no room
+    set_enabled(*panel, on || panel->objectName() == "connection_panel", no_room);
   // A pointer's hand has another one. Who watches has no pointer.
-  for (QAction* action : {irrigation_, suction_}) action->setEnabled(on && pointer_);
+  for (QAction* action : {irrigation_, suction_})
+    set_enabled(*action, on && pointer_, on ? tr("This window moves no hand in this room.") : no_room);
   if (watching_)
-    for (const char* name : kWorkActions) findChild<QAction*>(name)->setEnabled(false);
+    for (const char* name : kWorkActions) set_enabled(*findChild<QAction*>(name), false, watches);
 }
 
 // A sentence of another program may be longer than the bar. Then its tool tip has the rest.
@@ -271,7 +274,8 @@ void MainWindow::choose_room() {
 }
 
 void MainWindow::enable_opening(bool on) {
-  for (const char* name : kOpeningActions) findChild<QAction*>(name)->setEnabled(on);
+  for (const char* name : kOpeningActions)
+    set_enabled(*findChild<QAction*>(name), on, tr("A case is made or checked. Wait for it, or cancel it."));
 }
 
 void MainWindow::practise(const std::filesystem::path& bone, const std::filesystem::path& session,
@@ -363,7 +367,7 @@ void MainWindow::show_joined(const WatchedRoom& room) {
   pages_->setCurrentWidget(view_);
   if (!practice_) setWindowTitle(tr("%1 – Osteon").arg(QString::fromStdString(room.case_title)));
   enable_room_actions(true);
-  findChild<QAction*>("save_bone")->setEnabled(opened_.has_value());  // others' rooms have the bone at their server
+  set_enabled(*findChild<QAction*>("save_bone"), opened_.has_value(), tr("The server of this room has the bone."));
   gauge_timer_.start(kGaugePeriod_ms);
   capped_.start();
   cap_timer_.start(kCapPeriod_ms);

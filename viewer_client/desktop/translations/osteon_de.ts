@@ -945,6 +945,26 @@
         <source>The haptic client starts again to show force in this way.</source>
         <translation>Das Haptikprogramm startet neu, um die Kraft so zu zeigen.</translation>
     </message>
+    <message>
+        <source>Open a bone or join a room first.</source>
+        <translation>Öffnen Sie erst einen Knochen, oder betreten Sie einen Raum.</translation>
+    </message>
+    <message>
+        <source>You only watch this room.</source>
+        <translation>Sie sehen in diesem Raum nur zu.</translation>
+    </message>
+    <message>
+        <source>This window moves no hand in this room.</source>
+        <translation>Dieses Fenster bewegt in diesem Raum keine Hand.</translation>
+    </message>
+    <message>
+        <source>A case is made or checked. Wait for it, or cancel it.</source>
+        <translation>Ein Fall wird erstellt oder geprüft. Warten Sie, oder brechen Sie ab.</translation>
+    </message>
+    <message>
+        <source>The server of this room has the bone.</source>
+        <translation>Der Server dieses Raums hat den Knochen.</translation>
+    </message>
 </context>
 <context>
     <name>PracticeRoom</name>
