@@ -37,9 +37,9 @@ bool VirtualPad::plug_in() {
   pad.name = "Virtual Pad";
   pad.userdata = this;
   pad.Rumble = [](void* self, Uint16 low, Uint16 high) {
-    auto& pad = *static_cast<VirtualPad*>(self);
-    const std::lock_guard lock(pad.mutex_);
-    pad.heard_.push_back({low, high});
+    auto& me = *static_cast<VirtualPad*>(self);
+    const std::lock_guard lock(me.mutex_);
+    me.heard_.push_back({low, high});
     return 0;
   };
   const int index = SDL_JoystickAttachVirtualEx(&pad);

@@ -75,9 +75,13 @@ TEST_F(GamePadReaderTest, NobodyWaitsForASdlThatDoesNotAnswer) {
   ASSERT_TRUE(plug_.plug_in());
   BusySdl busy;
   reader_ = std::make_unique<GamePadReader>();
-  EXPECT_FALSE(reader_->take().is_open);
-  reader_->rumble({1.0, 1.0});
-  EXPECT_TRUE(busy.end());
+  // Meanwhile its thread comes to SDL.
+  for (const auto until = std::chrono::steady_clock::now() + 300ms; std::chrono::steady_clock::now() < until;) {
+    EXPECT_FALSE(reader_->take().is_open);
+    reader_->rumble({1.0, 1.0});
+    std::this_thread::sleep_for(5ms);
+  }
+  EXPECT_TRUE(busy.end()) << "somebody waited";
   EXPECT_TRUE(reads([&] { return read_.is_open; }));
   EXPECT_EQ(opened_, 1);
 }
