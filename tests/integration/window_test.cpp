@@ -727,7 +727,7 @@ TEST_F(WindowTest, AWindowThatWatchesFollowsTheToolAndChangesNothing) {
   for (const char* name : {"undo", "redo", "mark", "put_down", "spindle"})
     EXPECT_FALSE(other.findChild<QAction*>(name)->isEnabled()) << name;
   EXPECT_EQ(other.findChild<QAction*>("undo")->toolTip(), "You only watch this room.");
-  EXPECT_EQ(other.findChild<QAction*>("suction")->toolTip(), "This window moves no hand in this room.");
+  EXPECT_EQ(other.findChild<QCheckBox*>("suction_box")->toolTip(), "This window moves no hand in this room.");
   EXPECT_EQ(other.findChild<QAction*>("save_bone")->toolTip(), "The server of this room has the bone.");
   EXPECT_TRUE(other.findChild<QAction*>("look_tool")->isEnabled());
   EXPECT_FALSE(other.findChild<QToolButton*>("drill")->isEnabled());

@@ -16,6 +16,7 @@
 #include "common/input/pointer_link.hpp"
 #include "common/mechanics/force_law.hpp"
 #include "common/tools/tool.hpp"
+#include "viewer_client/desktop/enabled.hpp"
 #include "viewer_client/desktop/tool_names.hpp"
 #include "viewer_client/scene/tool_groups.hpp"
 #include "viewer_client/scene/tool_pointer.hpp"
@@ -149,7 +150,8 @@ void PropertiesPanel::add_switch(QAction& action) {
   form_->addRow(box);
   connect(box, &QCheckBox::clicked, &action, &QAction::trigger);
   connect(&action, &QAction::toggled, box, &QCheckBox::setChecked);
-  connect(&action, &QAction::changed, box, [box, action = &action] { box->setEnabled(action->isEnabled()); });
+  connect(&action, &QAction::changed, box,
+          [box, action = &action] { set_enabled(*box, action->isEnabled(), action->toolTip()); });
 }
 
 PropertiesPanel::Chosen PropertiesPanel::chosen() const {
