@@ -65,6 +65,9 @@ TEST_F(DisabledParts, SayWhyInTheirToolTips) {
   EXPECT_TRUE(drill->isEnabled());
   EXPECT_EQ(drill->toolTip(), "Drill 3.2 mm");
   EXPECT_TRUE(panel->toolTip().isEmpty());
+  EXPECT_EQ(tip_at(*window_->findChild<QLabel*>("teeth"), QPoint(2, 2)), "Choose a tool on the left first.");
+  click_tool("drill");
+  EXPECT_TRUE(window_->findChild<QLabel*>("teeth")->parentWidget()->toolTip().isEmpty());
 }
 
 }  // namespace

@@ -59,6 +59,7 @@ constexpr int kPointerPeriod_ms = 50;
 constexpr int kCapPeriod_ms = 16;
 constexpr int kMessage_ms = 8000;
 constexpr double kMostRiskLimit_mm = 50.0;
+constexpr int kFieldLetters = 40;  // most paths of files are seen as a whole
 constexpr const char* kFirstTool = "drill-3.2";
 
 // What changes the room, beside the tools.
@@ -246,6 +247,7 @@ void MainWindow::choose_room() {
   const auto field = [&](const QString& what, const char* key) {
     auto* edit = new QLineEdit(settings.value(QString("join/") + key).toString());
     edit->setObjectName(key);
+    edit->setMinimumWidth(kFieldLetters * edit->fontMetrics().averageCharWidth());
     form->addRow(what, edit);
     return edit;
   };

@@ -1067,6 +1067,14 @@
         <source>Cutting blunts the tool further. The gauge shows how blunt it is.</source>
         <translation>Schneiden macht das Werkzeug stumpfer. Die Anzeige sagt, wie stumpf es ist.</translation>
     </message>
+    <message>
+        <source>Choose a tool on the left first.</source>
+        <translation>Wählen Sie erst links ein Werkzeug.</translation>
+    </message>
+    <message>
+        <source>This tool has no spindle.</source>
+        <translation>Dieses Werkzeug hat keine Spindel.</translation>
+    </message>
 </context>
 <context>
     <name>QDockWidget</name>
