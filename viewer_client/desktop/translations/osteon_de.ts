@@ -855,7 +855,7 @@
     </message>
     <message>
         <source>Warn when the tip is nearer than (mm):</source>
-        <translation>Warnen, wenn die Spitze näher ist als, mm</translation>
+        <translation>Warnen, wenn die Spitze näher ist als (mm):</translation>
     </message>
     <message>
         <source>I and U</source>
