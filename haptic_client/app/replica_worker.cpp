@@ -159,7 +159,7 @@ void ReplicaWorker::take(const HandSupervised& decided) {
     outcome_.words.push_back({mono_ns(), decided.seq.value, 0, decided.supervision.words});
 }
 
-void ReplicaWorker::take(const WordsSaid& said) {
+void ReplicaWorker::take(const ChatReceived& said) {
   replica_.note(said.seq);
   log::info("words", {{"room_seq", said.seq.value}, {"from", said.from.value}, {"words", said.words}});
   outcome_.words.push_back({mono_ns(), said.seq.value, said.from.value, said.words});

@@ -56,7 +56,7 @@ class ReplicaWorker {
   void take(const RoomAtJoin& room);
   void take(const BonePart& part);
   void take(const HandSupervised& decided);
-  void take(const WordsSaid& said);
+  void take(const ChatReceived& said);
   void take(const EventNoted& noted) { replica_.note(noted.seq); }
   void take(const SceneSet& scene);
   void take(const CutCommitted& committed);

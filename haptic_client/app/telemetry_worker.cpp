@@ -79,7 +79,7 @@ void TelemetryWorker::send(bool any, const TickRow& row) {
 
 void TelemetryWorker::set_items() {
   for (; items_set_ < exchange_.items_left && !end_.lost() && Clock::now() >= items_from_; ++items_set_) {
-    const LeftItem& left = session_.left()[items_set_];
+    const PlacedItem& left = session_.left()[items_set_];
     SceneItem item;
     item.tool = session_.plan().steps[left.step].item.hash();
     item.pose_bone_item = left.pose_bone_item;

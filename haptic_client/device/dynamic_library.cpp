@@ -6,7 +6,7 @@
 
 namespace osteon::haptic {
 
-Result<DynamicLibrary> DynamicLibrary::load(const LibraryWanted& wanted) {
+Result<DynamicLibrary> DynamicLibrary::load(const LibraryRequest& wanted) {
   std::vector<std::string> names;
   if (!wanted.file.empty()) {
     std::error_code ignored;

@@ -11,7 +11,7 @@
 namespace osteon::haptic {
 
 // How to search for a library, and the remedy for a user who does not have it.
-struct LibraryWanted {
+struct LibraryRequest {
   std::string what;                    // e.g. "OpenHaptics"
   std::filesystem::path file;          // given by the user; empty: `names` are tried in order
   std::span<const char* const> names;  // as the dynamic linker knows them
@@ -23,7 +23,7 @@ class DynamicLibrary {
   DynamicLibrary() = default;
   // Errors: not_found (no such library); unsupported (the file is no library for this machine, or needs a library that
   // is missing). The errors are sentences with the remedy.
-  [[nodiscard]] static Result<DynamicLibrary> load(const LibraryWanted& wanted);
+  [[nodiscard]] static Result<DynamicLibrary> load(const LibraryRequest& wanted);
 
   // Sets `function` to a function of the library; returns false if it has none of that name.
   template <class F>
@@ -49,7 +49,7 @@ struct VendorLibrary {
 // Loads the library once for the process. `bind(call, need)` requests each function: need("its name", call.member).
 // Errors: those of DynamicLibrary::load; unsupported (it is another library than the one named by `is_not`).
 template <class Api, class Bind>
-[[nodiscard]] Result<const VendorLibrary<Api>*> load_vendor(const LibraryWanted& wanted, const std::string& is_not,
+[[nodiscard]] Result<const VendorLibrary<Api>*> load_vendor(const LibraryRequest& wanted, const std::string& is_not,
                                                             Bind bind) {
   static Mutex mutex{LockRank::leaf};                                 // of `loaded`; clang checks no locals
   static std::map<std::filesystem::path, VendorLibrary<Api>> loaded;  // nodes keep their addresses

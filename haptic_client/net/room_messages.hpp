@@ -54,7 +54,7 @@ struct HandSupervised {
 };
 
 // A message from a person in the room.
-struct WordsSaid {
+struct ChatReceived {
   RoomSeq seq;
   AuthorId from, to;  // to: null for all
   std::string words;
@@ -96,7 +96,7 @@ struct Interrupted {
 // just before or after it, and at every change of restrictions. After Interrupted everything is repeated from the
 // beginning, and cuts that were sent and are undecided are sent again.
 using RoomMessage = std::variant<FieldLeaf, RoomAtJoin, CutCommitted, CutRejected, BonePart, SceneSet, HandSupervised,
-                                 WordsSaid, EventNoted, Interrupted>;
+                                 ChatReceived, EventNoted, Interrupted>;
 
 // Functions called with what is received. `message`, `partner` and `lost` are called on the session's own thread, one
 // after the other.

@@ -211,10 +211,10 @@ Result<void> SessionReader::deliver(const v1::SessionResponse& response) {
                   {AuthorId{entry.decided_by()}, entry.decided_by_name()}});
       return {};
     }
-    case v1::SessionResponse::kSaid: {
-      const v1::Said& entry = response.said();
+    case v1::SessionResponse::kChat: {
+      const v1::ChatMessage& entry = response.chat();
       seq_ = std::max(seq_, RoomSeq{entry.room_seq()});
-      pass({WordsSaid{RoomSeq{entry.room_seq()}, AuthorId{entry.from()}, AuthorId{entry.to()}, entry.words()}});
+      pass({ChatReceived{RoomSeq{entry.room_seq()}, AuthorId{entry.from()}, AuthorId{entry.to()}, entry.words()}});
       return {};
     }
     case v1::SessionResponse::kPartner: {

@@ -25,7 +25,7 @@ void Coupling::reset(const Vec3& handle_mm, const Vec3& proxy_mm) noexcept {
   cutting_ = false;
 }
 
-void Coupling::let_go_all(const Vec3& handle_mm, const Vec3& proxy_mm) noexcept {
+void Coupling::release_all(const Vec3& handle_mm, const Vec3& proxy_mm) noexcept {
   reset(handle_mm, proxy_mm);
   slack_mm_ = proxy_mm - handle_mm;
   extension_mm_.setZero();
@@ -36,7 +36,7 @@ void Coupling::turn(const Eigen::Quaterniond& now_before) noexcept {
   returned_mm_ = now_before * returned_mm_;
 }
 
-void Coupling::let_go(Vec3& offset_mm, Vec3& extension_mm, const Vec3& to_mm) noexcept {
+void Coupling::release(Vec3& offset_mm, Vec3& extension_mm, const Vec3& to_mm) noexcept {
   const Vec3 change_mm = to_mm - extension_mm;
   offset_mm += change_mm;
   extension_mm_ += change_mm;
@@ -96,17 +96,17 @@ CouplingForce Coupling::step(const CouplingMoment& moment, const ProxyStep& prox
       std::sqrt(std::max(0.0, (moment.handle_mm + offset_mm() - moment.proxy_before_mm).squaredNorm() +
                                   2.0 * relaxed_mj / (k * moment.energy_scale)));
   if (e_mm.norm() > before_mm + kNothing_mm) {
-    let_go(returned_mm_, e_mm, e_mm * (before_mm / e_mm.norm()));
+    release(returned_mm_, e_mm, e_mm * (before_mm / e_mm.norm()));
     force.returned = true;
   }
   // Slack: the part that the device cannot show, and all of it where the bone has given way.
   const double most_mm = moment.limit_n / k;
   if (e_mm.norm() > most_mm) {
-    let_go(slack_mm_, e_mm, e_mm * (most_mm / e_mm.norm()));
+    release(slack_mm_, e_mm, e_mm * (most_mm / e_mm.norm()));
     force.limited = true;
   }
   if (proxy.breakthrough && k * e_mm.norm() >= kLeastToLetGo_n) {
-    let_go(slack_mm_, e_mm, Vec3::Zero());
+    release(slack_mm_, e_mm, Vec3::Zero());
     force.breakthrough = true;
   }
   // Where less force was shown than the spring's (missed ticks, the ramp, the monitor), the hand moves on without
@@ -115,7 +115,7 @@ CouplingForce Coupling::step(const CouplingMoment& moment, const ProxyStep& prox
   const double paid_mm = compression.on()
                              ? compression.paid_mm(k, size_mm, ledger.paid_mj(cutting_mj) / moment.energy_scale)
                              : ledger.paid_mm(k * moment.energy_scale, cutting_mj);
-  if (moment.fell_short && size_mm > paid_mm) let_go(slack_mm_, e_mm, e_mm * (paid_mm / size_mm));
+  if (moment.fell_short && size_mm > paid_mm) release(slack_mm_, e_mm, e_mm * (paid_mm / size_mm));
   ledger.settle(cutting_mj, stored_mj(e_mm.norm()) + now_turned_mj, now_turned_mj);
 
   // Returned bone may press again as far as the damping pays for it.
@@ -124,7 +124,7 @@ CouplingForce Coupling::step(const CouplingMoment& moment, const ProxyStep& prox
     const double most_step_mm = std::min(returned_mm, kBleed * (moment.handle_mm - handle_mm_).norm());
     const Vec3 back_mm = returned_mm_ * (most_step_mm / returned_mm);
     const double price_mj = stored_mj((e_mm - back_mm).norm()) - stored_mj(e_mm.norm());
-    if (price_mj <= 0.0 || ledger.draw(price_mj) >= price_mj) let_go(returned_mm_, e_mm, e_mm - back_mm);
+    if (price_mj <= 0.0 || ledger.draw(price_mj) >= price_mj) release(returned_mm_, e_mm, e_mm - back_mm);
   }
 
   force.spring_n = -k * e_mm;

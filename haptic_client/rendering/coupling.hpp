@@ -48,7 +48,7 @@ class Coupling {
   void reset(const Vec3& handle_mm, const Vec3& proxy_mm) noexcept;
   // [haptic] The handle was found elsewhere, for example after a device was reconnected. The tool stays; the difference
   // becomes slack.
-  void let_go_all(const Vec3& handle_mm, const Vec3& proxy_mm) noexcept;
+  void release_all(const Vec3& handle_mm, const Vec3& proxy_mm) noexcept;
   // [haptic] The bone's frame turned. `now_before` maps its old axes to the new ones. The offset belongs to the hand
   // and does not turn with the bone.
   void turn(const Eigen::Quaterniond& now_before) noexcept;
@@ -59,7 +59,7 @@ class Coupling {
 
  private:
   // Sets the extension. The excess becomes offset, which does not count as motion.
-  void let_go(Vec3& offset_mm, Vec3& extension_mm, const Vec3& to_mm) noexcept;
+  void release(Vec3& offset_mm, Vec3& extension_mm, const Vec3& to_mm) noexcept;
   void bleed(const CouplingMoment& moment) noexcept;
 
   Vec3 slack_mm_ = Vec3::Zero(), returned_mm_ = Vec3::Zero();

@@ -123,7 +123,7 @@ LoopReport HapticLoop::tick(const LoopInput& input, const Patch& patch, std::spa
     device_ = pose_bone_device;
   }
   if (input.device_ok && !device_was_ok_) {
-    coupling_.let_go_all(pose_bone_device.position_mm, proxy_.pose().position_mm);
+    coupling_.release_all(pose_bone_device.position_mm, proxy_.pose().position_mm);
     ledger_.reset();
     device_ = pose_bone_device;
     ramp_ = 0.0;

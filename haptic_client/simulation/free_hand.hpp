@@ -44,7 +44,7 @@ class FreeHandSession final : public Session {
   [[nodiscard]] HapticLoop& loop() noexcept override { return loop_; }
   [[nodiscard]] const ReadyPlan& plan() const noexcept override { return plan_; }
   [[nodiscard]] const std::vector<StepResult>& results() const noexcept override { return results_; }
-  [[nodiscard]] const std::vector<LeftItem>& left() const noexcept override { return left_; }
+  [[nodiscard]] const std::vector<PlacedItem>& left() const noexcept override { return left_; }
   [[nodiscard]] const HapticDevice& device() const noexcept override { return device_; }
 
  private:
@@ -55,7 +55,7 @@ class FreeHandSession final : public Session {
   DeviceLimits limits_;
   HapticLoop loop_;
   std::vector<StepResult> results_{1};
-  std::vector<LeftItem> left_;
+  std::vector<PlacedItem> left_;
   bool taken_up_ = false;
 };
 

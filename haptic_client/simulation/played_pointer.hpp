@@ -25,7 +25,7 @@ class PlayedPointerSession final : public Session {
   [[nodiscard]] HapticLoop& loop() noexcept override { return loop_; }
   [[nodiscard]] const ReadyPlan& plan() const noexcept override { return plan_; }
   [[nodiscard]] const std::vector<StepResult>& results() const noexcept override { return results_; }
-  [[nodiscard]] const std::vector<LeftItem>& left() const noexcept override { return left_; }
+  [[nodiscard]] const std::vector<PlacedItem>& left() const noexcept override { return left_; }
   [[nodiscard]] const HapticDevice& device() const noexcept override { return device_; }
 
  private:
@@ -38,7 +38,7 @@ class PlayedPointerSession final : public Session {
   std::vector<const ForceLaw*> laws_;  // as the recording numbers them; null: there is no law of that name
   int tool_ = 0;                       // in hand
   std::vector<StepResult> results_{1};
-  std::vector<LeftItem> left_;
+  std::vector<PlacedItem> left_;
 };
 
 }  // namespace osteon::haptic

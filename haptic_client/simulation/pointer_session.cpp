@@ -92,7 +92,7 @@ void PointerSession::read_pointer() noexcept {
   if (exchange_.commands.refresh()) command_ = exchange_.commands.value();
   ticks_since_message_ = command_.number != before ? 0 : std::min(ticks_since_message_ + 1, kSilentTicks + 1);
   command_.tool = std::clamp(command_.tool, 0, static_cast<int>(plan_.tools.size()) - 1);
-  if (!command_.push) let_go_ = true;
+  if (!command_.push) released_ = true;
   take_wear_and_law();
 }
 
@@ -169,7 +169,7 @@ bool PointerSession::come_to_rest(const Patch& patch, double speed_mm_per_s, dou
 void PointerSession::begin_push() noexcept {
   pushed_from_mm_ = pointed_mm_ = command_.target_mm;
   hand_ = {HandMode::push, command_.target_mm, axis()};
-  met_ = let_go_ = false;
+  met_ = released_ = false;
   deepest_mm_ = 0.0;
   enter(PointerPhase::pushes);
 }
@@ -204,7 +204,7 @@ void PointerSession::act(const Patch& patch, double dt_s, SurgeonOrder& order) n
     if (there) take_up(order), enter(PointerPhase::over);
     return;
   }
-  const bool held = there && command_.push && let_go_;
+  const bool held = there && command_.push && released_;
   const Vec3 tip_mm = last_.pose_bone_proxy.position_mm;
   const bool other_tool = command_.tool != held_;
   switch (phase_) {

@@ -83,7 +83,7 @@ class PointerSession final : public Session {
   [[nodiscard]] HapticLoop& loop() noexcept override { return loop_; }
   [[nodiscard]] const ReadyPlan& plan() const noexcept override { return plan_; }
   [[nodiscard]] const std::vector<StepResult>& results() const noexcept override { return results_; }
-  [[nodiscard]] const std::vector<LeftItem>& left() const noexcept override { return left_; }
+  [[nodiscard]] const std::vector<PlacedItem>& left() const noexcept override { return left_; }
   [[nodiscard]] const HapticDevice& device() const noexcept override { return device_; }
   [[nodiscard]] PointerPhase phase() const noexcept { return phase_; }
   // Ticks in a row without a message, after which the pointer counts as silent.
@@ -129,10 +129,10 @@ class PointerSession final : public Session {
   Vec3 pointed_mm_ = Vec3::Zero();      // the pointer's target of the tick before
   double deepest_mm_ = 0;               // of the tip along the axis since the push began
   bool met_ = false;                    // the tool has been in bone since the push began
-  bool let_go_ = true;                  // the button was up since the last push
+  bool released_ = true;                // the button was up since the last push
   double react_s_ = 0;
   std::vector<StepResult> results_{1};
-  std::vector<LeftItem> left_;
+  std::vector<PlacedItem> left_;
 };
 
 }  // namespace osteon::haptic

@@ -32,7 +32,7 @@ class Session {
   [[nodiscard]] virtual const ReadyPlan& plan() const noexcept = 0;
   [[nodiscard]] virtual const std::vector<StepResult>& results() const noexcept = 0;
   // Items left on the bone so far, in order. Entries never change: another thread may read those it was given.
-  [[nodiscard]] virtual const std::vector<LeftItem>& left() const noexcept = 0;
+  [[nodiscard]] virtual const std::vector<PlacedItem>& left() const noexcept = 0;
   [[nodiscard]] virtual const HapticDevice& device() const noexcept = 0;
 };
 
@@ -61,7 +61,7 @@ class SimulatedSession final : public Session {
   [[nodiscard]] HapticLoop& loop() noexcept override { return loop_; }
   [[nodiscard]] const ReadyPlan& plan() const noexcept override { return surgeon_.plan(); }
   [[nodiscard]] const std::vector<StepResult>& results() const noexcept override { return surgeon_.results(); }
-  [[nodiscard]] const std::vector<LeftItem>& left() const noexcept override { return surgeon_.left(); }
+  [[nodiscard]] const std::vector<PlacedItem>& left() const noexcept override { return surgeon_.left(); }
   [[nodiscard]] const Surgeon& surgeon() const noexcept { return surgeon_; }
   [[nodiscard]] const SimulatedDevice& device() const noexcept override { return device_; }
 

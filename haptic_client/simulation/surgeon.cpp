@@ -455,7 +455,7 @@ void Surgeon::finish_feed(const ReadyStep& step, const LoopReport& report) noexc
     enter(SurgeonPhase::retract);
     return;
   }
-  LeftItem item{step_, report.pose_bone_proxy, 0.0};
+  PlacedItem item{step_, report.pose_bone_proxy, 0.0};
   if (step.item.thread_pitch_mm > 0.0) {
     item.turns = depth_mm(step, report.pose_bone_proxy.position_mm) / step.item.thread_pitch_mm;
     item.pose_bone_item =

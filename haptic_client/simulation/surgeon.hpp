@@ -120,7 +120,7 @@ struct LayerMeans {
 };
 
 // An item that a step has left on the bone.
-struct LeftItem {
+struct PlacedItem {
   std::size_t step = 0;
   Pose pose_bone_item;
   double turns = 0;  // of a screw, since its tip was on the surface
@@ -151,7 +151,7 @@ class Surgeon {
   [[nodiscard]] bool done() const noexcept { return step_ >= plan_.steps.size(); }
   [[nodiscard]] const ReadyPlan& plan() const { return plan_; }
   // Items that the steps have left so far, in order. Entries never change: another thread may read those it was given.
-  [[nodiscard]] const std::vector<LeftItem>& left() const noexcept { return left_; }
+  [[nodiscard]] const std::vector<PlacedItem>& left() const noexcept { return left_; }
   // Number of the plan's guides that stand on the bone now.
   [[nodiscard]] std::size_t guides_placed() const noexcept { return guides_placed_; }
   [[nodiscard]] const std::vector<StepResult>& results() const { return results_; }
@@ -182,7 +182,7 @@ class Surgeon {
 
   ReadyPlan plan_;
   std::vector<StepResult> results_;
-  std::vector<LeftItem> left_;  // room for one per step
+  std::vector<PlacedItem> left_;  // room for one per step
   std::size_t step_ = 0, guides_placed_ = 0;
   SurgeonPhase phase_ = SurgeonPhase::take_up;
   double in_phase_s_ = 0, time_s_ = 0;

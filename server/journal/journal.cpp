@@ -32,7 +32,7 @@ Result<void> renew_wal(Disk& disk, const fs::path& wal) {
 
 // Removes what a process that died was about to write: half a checkpoint, or one that was never recorded or was
 // dropped.
-Result<void> clear_leftovers(Disk& disk, const fs::path& file, const std::vector<Checkpoint>& kept) {
+Result<void> remove_stale_files(Disk& disk, const fs::path& file, const std::vector<Checkpoint>& kept) {
   const auto names = disk.list(folder_of(file));
   if (!names) return tl::unexpected(names.error());
   for (const std::string& name : *names) {
@@ -172,7 +172,7 @@ Result<Journal> Journal::open_locked(const fs::path& file, const JournalOptions&
   }
   const auto kept = state.file.checkpoints();
   if (!kept) return tl::unexpected(kept.error());
-  if (Result<void> cleared = clear_leftovers(disk, file, *kept); !cleared) return tl::unexpected(cleared.error());
+  if (Result<void> cleared = remove_stale_files(disk, file, *kept); !cleared) return tl::unexpected(cleared.error());
   if (Result<void> begun = journal.begin_log(); !begun) return tl::unexpected(begun.error());
   return journal;
 }

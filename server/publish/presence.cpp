@@ -193,7 +193,7 @@ Bytes Presence::news(PresenceCursor& cursor, AuthorId reader, const PeopleRights
   }
   for (const std::uint32_t known : cursor.annotations)
     if (rights.drawings && !drawn.contains(known)) out.add_wiped(known);
-  for (const Said& said : words_) {
+  for (const ChatEntry& said : words_) {
     const bool own = !said.to || is_readers(said.to) || is_readers(said.from);
     if (said.number <= cursor.words || !(own ? rights.own_words : rights.others_words)) continue;
     v1::Words& words = *out.add_words();

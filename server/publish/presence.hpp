@@ -93,7 +93,7 @@ class Presence {
     std::uint64_t revision = 0;
     Annotation annotation;
   };
-  struct Said {
+  struct ChatEntry {
     std::uint64_t number = 0;
     RoomSeq seq;
     AuthorId from, to;
@@ -110,7 +110,7 @@ class Presence {
   std::uint64_t revision_ OSTEON_GUARDED_BY(mutex_) = 1, published_ OSTEON_GUARDED_BY(mutex_) = 0;
   std::map<AuthorId, Entry> people_ OSTEON_GUARDED_BY(mutex_);
   std::map<std::uint32_t, Drawn> annotations_ OSTEON_GUARDED_BY(mutex_);
-  std::deque<Said> words_ OSTEON_GUARDED_BY(mutex_);
+  std::deque<ChatEntry> words_ OSTEON_GUARDED_BY(mutex_);
   std::uint64_t words_said_ OSTEON_GUARDED_BY(mutex_) = 0;
   RoomSeq room_seq_ OSTEON_GUARDED_BY(mutex_);
 };

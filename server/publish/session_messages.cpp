@@ -145,10 +145,10 @@ SessionMessage supervised_message(RoomSeq seq, const Restrictions& supervision, 
 
 SessionMessage said_message(RoomSeq seq, AuthorId from, const WordsEntry& words) {
   v1::SessionResponse response;
-  response.mutable_said()->set_room_seq(seq.value);
-  response.mutable_said()->set_from(from.value);
-  response.mutable_said()->set_to(words.to.value);
-  response.mutable_said()->set_words(words.words);
+  response.mutable_chat()->set_room_seq(seq.value);
+  response.mutable_chat()->set_from(from.value);
+  response.mutable_chat()->set_to(words.to.value);
+  response.mutable_chat()->set_words(words.words);
   return message_of(response, seq, StreamContent::own_words);
 }
 

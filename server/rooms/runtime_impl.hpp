@@ -76,7 +76,7 @@ struct RoomRuntime::Impl {
     return name.empty() ? 0 : persons.emplace(name, static_cast<std::uint32_t>(persons.size() + 1)).first->second;
   }
   // What sessions are sent for one event.
-  struct Said {
+  struct EventMessages {
     std::vector<SessionMessage> messages;
     Personal personal;
   };

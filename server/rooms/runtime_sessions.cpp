@@ -91,15 +91,15 @@ void RoomRuntime::Impl::decide(QueuedEvent& queued) {
     room_seq = room.room_seq().value;
     return decision;
   }();
-  std::vector<Said> said;
+  std::vector<EventMessages> sent;
   if (event && event->room_seq) {
-    said.push_back({messages_of(*event), personal_message(*event)});
+    sent.push_back({messages_of(*event), personal_message(*event)});
     event->leaves.clear();
-    for (const RoomEvent& one : event->further) said.push_back({messages_of(one), personal_message(one)});
+    for (const RoomEvent& one : event->further) sent.push_back({messages_of(one), personal_message(one)});
     if (event->scene || event->bone) show_scene();
     if (event->bone) note_changed(queued.arrived);
   }
-  later([this, said = std::move(said), event = std::move(event),
+  later([this, sent = std::move(sent), event = std::move(event),
          answer = std::move(queued.answer)](const Result<void>& durable) {
     if (!durable) return answer(tl::unexpected(durable.error()));
     if (event) {
@@ -112,7 +112,7 @@ void RoomRuntime::Impl::decide(QueuedEvent& queued) {
         const std::uint32_t number = number_of(event->tool->hash);
         sessions.each([&](SessionSubscriber& subscriber) { subscriber.know_tool(number, event->tool->hash); });
       }
-      for (const Said& one : said)
+      for (const EventMessages& one : sent)
         for (const SessionMessage& message : one.messages)
           sessions.each([&](SessionSubscriber& subscriber) {
             subscriber.enqueue(one.personal.is_for(subscriber.author()) ? *one.personal.message : message);

@@ -65,7 +65,7 @@ template <class Reactor>
 class OutStream : public Reactor {
  public:
   // How long a reader may take to read the end of the stream.
-  static constexpr std::chrono::milliseconds kLetGoAfter{1000};
+  static constexpr std::chrono::milliseconds kCancelAfter{1000};
 
   // Hands the stream to gRPC, which holds it until OnDone. Queued jobs and cuts may hold it longer. `context`: of its
   // call, which is cancelled if the reader does not read; null: it is never cancelled.
@@ -76,7 +76,7 @@ class OutStream : public Reactor {
       const MutexLock lock(raw->context_mutex_);
       raw->context_ = context;
     }
-    raw->can_let_go_ = context != nullptr;
+    raw->can_cancel_ = context != nullptr;
     raw->self_ = std::move(stream);
     return raw;
   }
@@ -139,7 +139,7 @@ class OutStream : public Reactor {
     if (!closing_ || cuts_off) closing_ = Status(status.error_code(), short_words(status.error_message()));
     if (cuts_off) {
       drop_waiting();
-      let_go_later();
+      cancel_later();
     }
     pump();
   }
@@ -172,21 +172,21 @@ class OutStream : public Reactor {
 
  private:
   // The message in flight, and the end itself, wait for the reader for a short time only.
-  void let_go_later() OSTEON_REQUIRES(mutex_) {
-    if (done_ || !can_let_go_) return;
+  void cancel_later() OSTEON_REQUIRES(mutex_) {
+    if (done_ || !can_cancel_) return;
     alarm_ = std::make_unique<grpc::Alarm>();
-    alarm_->Set(std::chrono::system_clock::now() + kLetGoAfter, [this, weak = std::weak_ptr<void>(self_)](bool rang) {
-      if (const std::shared_ptr<void> keep = rang ? weak.lock() : nullptr) let_go();
+    alarm_->Set(std::chrono::system_clock::now() + kCancelAfter, [this, weak = std::weak_ptr<void>(self_)](bool rang) {
+      if (const std::shared_ptr<void> keep = rang ? weak.lock() : nullptr) cancel();
     });
   }
-  void let_go() {
+  void cancel() {
     const MutexLock lock(context_mutex_);
     if (context_) context_->TryCancel();
   }
 
   Mutex context_mutex_{LockRank::leaf};
   grpc::CallbackServerContext* context_ OSTEON_GUARDED_BY(context_mutex_) = nullptr;
-  bool can_let_go_ = false;  // set before anybody else has the stream
+  bool can_cancel_ = false;  // set before anybody else has the stream
   std::unique_ptr<grpc::Alarm> alarm_ OSTEON_GUARDED_BY(mutex_);
   std::shared_ptr<void> self_;
   std::shared_ptr<OpenStream> watched_;  // shared with the authorizer while it ends the stream

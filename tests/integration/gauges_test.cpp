@@ -1,5 +1,5 @@
 // The gauges of the window: when the plot is drawn, and what the devices of others hold. And the panel Tool,
-// whose choices the gauges show.
+// whose choices the gauges show. And the distance to structures at risk.
 #include <gtest/gtest.h>
 
 #include <QAction>
@@ -13,9 +13,12 @@
 #include <iterator>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "tests/integration/window_bench.hpp"
 #include "viewer_client/desktop/gauges_panel.hpp"
+#include "viewer_client/desktop/risk_gauge.hpp"
+#include "viewer_client/desktop/tool_names.hpp"
 
 namespace osteon {
 namespace {
@@ -72,6 +75,54 @@ TEST(HandForce, IsThePointersElseThatOfTheStatesDevice) {
   output.device_holds_n = 30.0;
   EXPECT_EQ(hand_force(state, output)->hand_n, 5.0);
   EXPECT_EQ(hand_force(state, output)->device_holds_n, 30.0);
+}
+
+// The tip of a tool, above the middle of the plate below.
+CuttingState tool_at(const char* name, double above_mm) {
+  CuttingState state;
+  state.tool_name = name;
+  state.pose_bone_tool.position_mm = {0, 0, above_mm};
+  return state;
+}
+
+// A square plate of 200 mm in the plane z = 0, without thickness. So the distance of a point above it is its z.
+std::shared_ptr<const SurgicalPlan> plan_with_plate() {
+  SurgicalPlan::Structure plate;
+  plate.name = "plate";
+  plate.surface.positions_mm = {{-100, -100, 0}, {100, -100, 0}, {100, 100, 0}, {-100, 100, 0}};
+  plate.surface.triangles = {{0, 1, 2}, {0, 2, 3}, {2, 1, 0}, {3, 2, 0}};
+  SurgicalPlan plan;
+  plan.structures.push_back(plate);
+  return std::make_shared<const SurgicalPlan>(plan);
+}
+
+TEST(RiskGauge, ShowsTheNearestOfAllPeoplesToolsAndEachInItsToolTip) {
+  const test::Desk desk;
+  ASSERT_TRUE(desk.stands()) << "Xvfb is needed; deploy/install installs it";
+  QLocale::setDefault(QLocale::c());
+  RiskGauge gauge;
+  gauge.set_limit_mm(5.0);
+  gauge.set_plan(plan_with_plate());
+  const std::string drill = tool_title("drill-3.2").toStdString(), burr = tool_title("burr-round-5").toStdString();
+  ASSERT_NE(drill, burr);
+
+  const CuttingState far = tool_at("drill-3.2", 40.0), near = tool_at("burr-round-5", 2.0), empty = tool_at("", 1.0);
+  gauge.show_tools(std::vector{empty});
+  EXPECT_TRUE(gauge.isHidden()) << "no hand holds a tool";
+  gauge.show_tools(std::vector{empty, far});
+  EXPECT_EQ(gauge.text().toStdString(), "plate: 40.0 mm") << "one tool needs no name";
+  EXPECT_FALSE(gauge.warns());
+  // Whoever comes first in the list.
+  for (const auto& states : {std::vector{far, near}, std::vector{near, far}}) {
+    gauge.show_tools(states);
+    EXPECT_EQ(gauge.text().toStdString(), burr + ": Near plate: 2.0 mm");
+    EXPECT_TRUE(gauge.warns());
+    EXPECT_TRUE(gauge.toolTip().split('\n').contains(QString::fromStdString(drill + ": plate: 40.0 mm")));
+    EXPECT_TRUE(gauge.toolTip().split('\n').contains(QString::fromStdString(burr + ": Near plate: 2.0 mm")));
+  }
+  gauge.show_tools({});
+  EXPECT_TRUE(gauge.isHidden());
+  EXPECT_TRUE(gauge.toolTip().isEmpty());
 }
 
 class ToolPanel : public test::WindowBench {

@@ -47,7 +47,7 @@ TEST_F(PadTest, APadDrillsRumblesUndoesAndLetsGoWhenItIsUnplugged) {
 
   // The left stick brings the tool onto the bone, and moves it to the picture's right: seen from above, with the face
   // upward, that is the patient's right, -x.
-  PadState hand;
+  GamePadState hand;
   hand.left.x() = 1.0;
   plug_->hold(hand);
   ASSERT_TRUE(until([&] { return pointer.on_bone(); })) << problem();
@@ -64,13 +64,14 @@ TEST_F(PadTest, APadDrillsRumblesUndoesAndLetsGoWhenItIsUnplugged) {
   hand.right_trigger = 0.8;
   plug_->hold(hand);
   ASSERT_TRUE(until([&] { return pointer.pushing(); })) << problem();
-  constexpr double kPulled = PadControl::kTriggerPulled;
+  constexpr double kPulled = GamePadMapping::kTriggerPulled;
   EXPECT_NEAR(pointer.push_n(), 1.0 + 39.0 * (0.8 - kPulled) / (1.0 - kPulled), 0.01);
   ASSERT_TRUE(until([&] { return cut(); })) << problem();
   EXPECT_TRUE(until([&] { return !plug_->quiet(); }));
   // 30 N are the device's, so 20 N or more are √(2/3) of the motor.
   EXPECT_TRUE(until([&] {
-    return std::ranges::any_of(plug_->heard(), [](const auto& motors) { return motors.low > 0.8 * 65535; });
+    const auto heard = plug_->heard();
+    return std::ranges::any_of(heard, [](const auto& motors) { return motors.low > 0.8 * 65535; });
   }));
 
   // Let go, the tool comes out and the motors rest. The wheel's push is back.

@@ -270,16 +270,16 @@ TEST_F(WindowTest, ADragWithoutAToolTurnsTheBone) {
 }
 
 // A view is kept, left, and taken again.
-TEST_F(WindowTest, AKeptViewComesBack) {
+TEST_F(WindowTest, ASavedViewComesBack) {
   open();
   const CameraView kept = view_->camera();
-  trigger("keep_view");
+  trigger("save_view");
   trigger("back");
   ASSERT_GT((view_->camera().eye_mm - kept.eye_mm).norm(), 10.0);
   trigger("view_1");
   EXPECT_LT((view_->camera().eye_mm - kept.eye_mm).norm(), 1e-6);
   EXPECT_LT((view_->camera().up - kept.up).norm(), 1e-6);
-  trigger("forget_views");
+  trigger("delete_views");
   EXPECT_FALSE(window_->findChild<QAction*>("view_1")->isVisible());
 }
 
@@ -726,6 +726,9 @@ TEST_F(WindowTest, AWindowThatWatchesFollowsTheToolAndChangesNothing) {
   // No tool, no item and no undo, whatever is chosen.
   for (const char* name : {"undo", "redo", "mark", "put_down", "spindle"})
     EXPECT_FALSE(other.findChild<QAction*>(name)->isEnabled()) << name;
+  EXPECT_EQ(other.findChild<QAction*>("undo")->toolTip(), "You only watch this room.");
+  EXPECT_EQ(other.findChild<QCheckBox*>("suction_box")->toolTip(), "This window moves no hand in this room.");
+  EXPECT_EQ(other.findChild<QAction*>("save_bone")->toolTip(), "The server of this room has the bone.");
   EXPECT_TRUE(other.findChild<QAction*>("look_tool")->isEnabled());
   EXPECT_FALSE(other.findChild<QToolButton*>("drill")->isEnabled());
   for (const char* name : {"drill", "pin"}) other.findChild<QToolButton*>(name)->defaultAction()->trigger();

@@ -214,8 +214,8 @@ Crossed run_touch(const OverseenRun& run, std::uint64_t seed, int seconds) {
 }
 
 json in_contact(const InContact& held) {
-  return {{"stopped", held.stopped}, {"taken", held.taken},     {"given_back", held.given_back}, {"led", held.led},
-          {"let_go", held.let_go},   {"limited", held.limited}, {"undone", held.undone}};
+  return {{"stopped", held.stopped},   {"taken", held.taken},     {"given_back", held.given_back}, {"led", held.led},
+          {"released", held.released}, {"limited", held.limited}, {"undone", held.undone}};
 }
 
 // Each tool at each device over a connection of that delay, on fixed bone or on bone that another user pushes too.
@@ -235,7 +235,7 @@ json run_touches(bool mount, int delay_ms, int seconds) {
       worst.touching += one.touching;
       worst.cutting += one.cutting;
       held.stopped += one.in_contact.stopped, held.taken += one.in_contact.taken, held.led += one.in_contact.led;
-      held.given_back += one.in_contact.given_back, held.let_go += one.in_contact.let_go;
+      held.given_back += one.in_contact.given_back, held.released += one.in_contact.released;
       held.limited += one.in_contact.limited, held.undone += one.in_contact.undone;
     }
   return {{"mount", mount},

@@ -380,7 +380,7 @@ class Watching(Case):
         stub = people_grpc.PeopleServiceStub(self.hand.channel)
         said = stub.Say(people.SayRequest(author=self.hand.author, words="hello"), timeout=20).room_seq
         decided = self.groove(self.session, 1)[0]
-        for session, kind in ((self.session, "said"), (old, "noted")):
+        for session, kind in ((self.session, "chat"), (old, "noted")):
             session.wait(lambda s=session: any(e[1] == decided[1] for e in s.events))
             self.assertEqual([e[0] for e in session.events if e[1] == said], [kind])
 

@@ -355,7 +355,7 @@ void SimClient::note(const SceneSet& scene) { ledger_.told_up_to(scene.seq); }
 void SimClient::note(const HandSupervised& decided) {
   if (decided.seq) ledger_.told_event(decided.seq, EventKind::supervise);
 }
-void SimClient::note(const WordsSaid& said) { ledger_.told_event(said.seq, EventKind::words); }
+void SimClient::note(const ChatReceived& said) { ledger_.told_event(said.seq, EventKind::words); }
 void SimClient::note(const EventNoted& noted) { ledger_.told_up_to(noted.seq); }
 
 void SimClient::pass(RoomMessage&& message) {

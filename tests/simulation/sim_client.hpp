@@ -117,7 +117,7 @@ class SimClient {
   void note(const BonePart& part);
   void note(const SceneSet& scene);
   void note(const HandSupervised& decided);
-  void note(const WordsSaid& said);
+  void note(const ChatReceived& said);
   void note(const EventNoted& noted);
   void note(const Interrupted&) {}
   void pass(RoomMessage&& message);
@@ -129,7 +129,7 @@ class SimClient {
   void take(const BonePart& part);
   void take(const HandSupervised& decided);
   void take(const SceneSet& scene) { replica_->note(scene.seq); }
-  void take(const WordsSaid& said) { replica_->note(said.seq); }
+  void take(const ChatReceived& said) { replica_->note(said.seq); }
   void take(const EventNoted& noted) { replica_->note(noted.seq); }
   void take(const Interrupted&);
   void measure(const CutCommitted& committed, bool by_datagram);  // how late others' cuts are felt

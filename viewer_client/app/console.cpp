@@ -385,7 +385,7 @@ Console::Answer Console::limit(const Words& words) {
 }
 
 Console::Answer Console::undo(const Words& words) {
-  WhatToUndo what;
+  UndoSelection what;
   if (words.size() == 2 && words[1] == "all") {
     what.all = true;
   } else if (words.size() >= 3 && words[1] == "to") {
@@ -547,7 +547,7 @@ Console::Answer Console::view(const Words& words) {
 
 Console::Answer Console::demonstrate(const Words& words) {
   Words rest(words.begin() + 1, words.end());
-  WhatToDemonstrate what;
+  DemonstrationSource what;
   if (const auto name = take_pair(rest, "of")) {
     const Result<PersonSeen> person = find(*name);
     const auto author =

@@ -160,35 +160,35 @@ void BoneView::follow_cap(const SpaceMouseState& cap, double dt_s) {
   pointer_moved();
 }
 
-void BoneView::follow_pad(const PadOrder& order, double dt_s) {
-  if (!order.used) return;
+void BoneView::follow_pad(const GamePadCommand& command, double dt_s) {
+  if (!command.used) return;
   constexpr double kFastest_rad_per_s = 1.2, kShift_per_s = 0.4, kFine = 0.1;
-  const double scale = order.fine ? kFine : 1.0;
-  const Eigen::Vector2d turn_rad = scale * kFastest_rad_per_s * dt_s * order.turn;
+  const double scale = command.fine ? kFine : 1.0;
+  const Eigen::Vector2d turn_rad = scale * kFastest_rad_per_s * dt_s * command.turn;
   if (!holding_) {
-    const Eigen::Vector2d shift = scale * kShift_per_s * dt_s * order.slide;
+    const Eigen::Vector2d shift = scale * kShift_per_s * dt_s * command.slide;
     if (!turn_rad.isZero()) look(orbited(camera(), turn_rad.x(), turn_rad.y()));
     if (!shift.isZero()) look(shifted(camera(), shift.x(), shift.y()));
     return;
   }
-  if (order.spindle) pointer_.set_spindle(*order.spindle);
-  if (order.toggles_spindle) pointer_.set_spindle(!pointer_.spindle());
+  if (command.spindle) pointer_.set_spindle(*command.spindle);
+  if (command.toggles_spindle) pointer_.set_spindle(!pointer_.spindle());
   if (!updater_ || (pointer_.pushing() && !pad_pushes_)) return pointer_moved();  // the mouse or the pen is at work
   pad_leads_ = true;
   pointer_.set_source(PointerSource::game_pad);
-  if (order.fine != pad_fine_) pointer_.set_fine(pad_fine_ = order.fine);
+  if (command.fine != pad_fine_) pointer_.set_fine(pad_fine_ = command.fine);
   // A hand that pushes keeps its axis.
   if (!pad_pushes_ && !turn_rad.isZero()) pointer_.turn(camera(), turn_rad.x(), turn_rad.y());
-  if (!order.slide.isZero() || (order.push_begins && !pointer_.on_bone())) {
+  if (!command.slide.isZero() || (command.push_begins && !pointer_.on_bone())) {
     // While the hand pushes, it makes fine motions a tenth by itself.
-    const Eigen::Vector2d slide = (pad_pushes_ ? 1.0 : scale) * order.slide;
+    const Eigen::Vector2d slide = (pad_pushes_ ? 1.0 : scale) * command.slide;
     pointer_.slide(camera(), slide.x(), slide.y(), dt_s, updater_->surface());
     if (!is_drawn(clipping_, pointer_.input().target_mm)) pointer_.leave();
   }
   // A push that the window has ended begins again with the next pull of the trigger.
-  if (order.push_begins) pad_pushes_ = begin_pen_push();
-  if (pad_pushes_ && order.push) pointer_.set_push(order.push_n);
-  if (pad_pushes_ && !order.push) lift_pen();
+  if (command.push_begins) pad_pushes_ = begin_pen_push();
+  if (pad_pushes_ && command.push) pointer_.set_push(command.push_n);
+  if (pad_pushes_ && !command.push) lift_pen();
   pointer_moved();
 }
 

@@ -14,7 +14,7 @@
 #include <QVTKOpenGLNativeWidget.h>
 
 #include "common/input/space_mouse_report.hpp"
-#include "viewer_client/pad/pad_control.hpp"
+#include "viewer_client/pad/game_pad_mapping.hpp"
 #include "viewer_client/render/bone_scene.hpp"
 #include "viewer_client/render/scene_updater.hpp"
 #include "viewer_client/scene/tool_pointer.hpp"
@@ -64,7 +64,7 @@ class BoneView : public QVTKOpenGLNativeWidget {
   void follow_cap(const SpaceMouseState& cap, double dt_s);
   // A game pad asked for this for dt_s. Its left stick moves the tool over the bone, its right one turns the tool.
   // Without a tool they move and turn the bone.
-  void follow_pad(const PadOrder& order, double dt_s);
+  void follow_pad(const GamePadCommand& command, double dt_s);
   // The pad is away: the mouse says again where the tool is.
   void pad_gone();
   [[nodiscard]] bool pad_leads() const { return pad_leads_; }

@@ -29,15 +29,17 @@
 #include <algorithm>
 #include <cmath>
 #include <initializer_list>
+#include <span>
 #include <utility>
 
 #include "common/tools/tool.hpp"
 #include "viewer_client/desktop/bone_view.hpp"
 #include "viewer_client/desktop/clipping_panel.hpp"
 #include "viewer_client/desktop/connection_panel.hpp"
+#include "viewer_client/desktop/enabled.hpp"
 #include "viewer_client/desktop/force_menu.hpp"
+#include "viewer_client/desktop/game_pad_controller.hpp"
 #include "viewer_client/desktop/gauges_panel.hpp"
-#include "viewer_client/desktop/pad_hand.hpp"
 #include "viewer_client/desktop/properties_panel.hpp"
 #include "viewer_client/desktop/risk_gauge.hpp"
 #include "viewer_client/desktop/sound_control.hpp"
@@ -57,6 +59,7 @@ constexpr int kPointerPeriod_ms = 50;
 constexpr int kCapPeriod_ms = 16;
 constexpr int kMessage_ms = 8000;
 constexpr double kMostRiskLimit_mm = 50.0;
+constexpr int kFieldLetters = 40;  // most paths of files are seen as a whole
 constexpr const char* kFirstTool = "drill-3.2";
 
 // What changes the room, beside the tools.
@@ -83,7 +86,7 @@ MainWindow::MainWindow() {
   resize(1280, 800);
   setAcceptDrops(true);
   sockets_ = QStandardPaths::writableLocation(QStandardPaths::RuntimeLocation).toStdString();
-  leftovers_ = std::make_unique<Leftovers>(sockets_);
+  stale_files_ = std::make_unique<StaleFiles>(sockets_);
   pages_ = new QStackedWidget;
   start_ = new StartPage({[this](const ExampleBone& bone) { open_example(bone); },
                           [this](const RecentEntry& entry) { practise(entry.bone, entry.session); },
@@ -190,14 +193,16 @@ void MainWindow::make_status() {
 }
 
 void MainWindow::enable_room_actions(bool on) {
-  for (QAction* action : room_actions_) action->setEnabled(on);
-  tools_->setEnabled(on && !watching_);
-  for (QDockWidget* panel : findChildren<QDockWidget*>())
-    panel->setEnabled(on || panel->objectName() == "connection_panel");  // it says why there is no room
+  const QString no_room = tr("Open a bone or join a room first."), watches = tr("You only watch this room.");
+  for (QAction* action : room_actions_) set_enabled(*action, on, no_room);
+  tools_->set_tools_enabled(on && !watching_, on ? watches : no_room);
+  for (QDockWidget* panel : findChildren<QDockWidget*>())  // that of the connections says why there is no room
+    set_enabled(*panel, on || panel->objectName() == "connection_panel", no_room);
   // A pointer's hand has another one. Who watches has no pointer.
-  for (QAction* action : {irrigation_, suction_}) action->setEnabled(on && pointer_);
+  for (QAction* action : {irrigation_, suction_})
+    set_enabled(*action, on && pointer_, on ? tr("This window moves no hand in this room.") : no_room);
   if (watching_)
-    for (const char* name : kWorkActions) findChild<QAction*>(name)->setEnabled(false);
+    for (const char* name : kWorkActions) set_enabled(*findChild<QAction*>(name), false, watches);
 }
 
 // A sentence of another program may be longer than the bar. Then its tool tip has the rest.
@@ -242,6 +247,7 @@ void MainWindow::choose_room() {
   const auto field = [&](const QString& what, const char* key) {
     auto* edit = new QLineEdit(settings.value(QString("join/") + key).toString());
     edit->setObjectName(key);
+    edit->setMinimumWidth(kFieldLetters * edit->fontMetrics().averageCharWidth());
     form->addRow(what, edit);
     return edit;
   };
@@ -270,7 +276,8 @@ void MainWindow::choose_room() {
 }
 
 void MainWindow::enable_opening(bool on) {
-  for (const char* name : kOpeningActions) findChild<QAction*>(name)->setEnabled(on);
+  for (const char* name : kOpeningActions)
+    set_enabled(*findChild<QAction*>(name), on, tr("A case is made or checked. Wait for it, or cancel it."));
 }
 
 void MainWindow::practise(const std::filesystem::path& bone, const std::filesystem::path& session,
@@ -362,14 +369,15 @@ void MainWindow::show_joined(const WatchedRoom& room) {
   pages_->setCurrentWidget(view_);
   if (!practice_) setWindowTitle(tr("%1 – Osteon").arg(QString::fromStdString(room.case_title)));
   enable_room_actions(true);
-  findChild<QAction*>("save_bone")->setEnabled(opened_.has_value());  // others' rooms have the bone at their server
+  set_enabled(*findChild<QAction*>("save_bone"), opened_.has_value(), tr("The server of this room has the bone."));
   gauge_timer_.start(kGaugePeriod_ms);
   capped_.start();
   cap_timer_.start(kCapPeriod_ms);
   if (pointer_) pointer_timer_.start(kPointerPeriod_ms);
   if (!pad_)
-    pad_ = std::make_unique<PadHand>(*view_, PadHand::Events{[this](const QString& sentence) { say(sentence); },
-                                                             [this] { findChild<QAction*>("undo")->trigger(); }});
+    pad_ = std::make_unique<GamePadController>(
+        *view_, GamePadController::Events{[this](const QString& sentence) { say(sentence); },
+                                          [this] { findChild<QAction*>("undo")->trigger(); }});
   if (opened_) remember(*opened_);
   made_anew_.clear();
   view_->setFocus();
@@ -560,7 +568,7 @@ TourStep MainWindow::next_step() const {
 
 void MainWindow::follow_pad() {
   if (!pad_) return;
-  PadFeel feel;
+  RumbleInput feel;
   const std::optional<PointerOutput> hand = pointer_ ? pointer_->newest() : std::nullopt;
   // A force of before says nothing of now: the haptic client may hang, or the room be away.
   constexpr std::chrono::milliseconds kFresh{60};
@@ -597,7 +605,7 @@ void MainWindow::refresh_gauges() {
     position_->clear();
   }
   risk_->set_plan(updater != nullptr ? updater->plan() : nullptr);
-  risk_->show_tip(held != nullptr ? std::optional(held->pose_bone_tool.position_mm) : std::nullopt);
+  risk_->show_tools(updater != nullptr ? updater->states() : std::span<const CuttingState>());
   if (const QString fault = QString::fromStdString(view_->take_plan_fault()); !fault.isEmpty()) say(fault);
   if (pointer_)
     device_->setText(!pointer_->connected() ? tr("The pointer's device is away")

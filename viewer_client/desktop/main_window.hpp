@@ -12,10 +12,10 @@
 #include "common/input/pointer_link.hpp"
 #include "common/input/space_mouse.hpp"
 #include "common/wire/credentials.hpp"
-#include "viewer_client/desktop/leftovers.hpp"
 #include "viewer_client/desktop/library.hpp"
 #include "viewer_client/desktop/practice_room.hpp"
 #include "viewer_client/desktop/room_link.hpp"
+#include "viewer_client/desktop/stale_files.hpp"
 
 class QAction;
 class QKeySequence;
@@ -28,7 +28,7 @@ namespace osteon {
 class BoneView;
 class ClippingPanel;
 class GaugesPanel;
-class PadHand;
+class GamePadController;
 class PropertiesPanel;
 class SoundControl;
 class RiskGauge;
@@ -155,7 +155,7 @@ class MainWindow : public QMainWindow {
   QAction *sound_ = nullptr, *spindle_ = nullptr, *irrigation_ = nullptr, *suction_ = nullptr;
 
   std::filesystem::path sockets_;
-  std::unique_ptr<Leftovers> leftovers_;  // outlives the programs below
+  std::unique_ptr<StaleFiles> stale_files_;  // outlives the programs below
   std::unique_ptr<CaseMaker> maker_;
   std::unique_ptr<ImporterRun> saver_, checker_;
   std::filesystem::path made_anew_;  // the case that make_anew() got last; empty: a room has opened since
@@ -175,7 +175,7 @@ class MainWindow : public QMainWindow {
   QElapsedTimer sent_;      // since the last message to the hand
   bool sent_push_ = false;  // what it said
   SpaceMouseWatch space_mouse_{[](const std::string&) {}};
-  std::unique_ptr<PadHand> pad_;  // from the first room on
+  std::unique_ptr<GamePadController> pad_;  // from the first room on
 };
 
 }  // namespace osteon

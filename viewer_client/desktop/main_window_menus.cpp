@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "viewer_client/desktop/bone_view.hpp"
+#include "viewer_client/desktop/enabled.hpp"
 #include "viewer_client/desktop/force_menu.hpp"
 #include "viewer_client/desktop/language.hpp"
 #include "viewer_client/desktop/main_window.hpp"
@@ -191,7 +192,10 @@ void MainWindow::make_actions() {
   make_view_menu();
   make_tools_menu();
   make_help_menu();
-  for (const QAction* menu : menuBar()->actions()) add_menu_keys(*menu->menu());
+  for (const QAction* menu : menuBar()->actions()) {
+    add_menu_keys(*menu->menu());
+    show_tool_tips(*menu->menu());
+  }
   QToolBar* upper = addToolBar(tr("Actions"));
   upper->setObjectName("actions");
   for (const char* name :

@@ -16,6 +16,7 @@
 #include "common/input/pointer_link.hpp"
 #include "common/mechanics/force_law.hpp"
 #include "common/tools/tool.hpp"
+#include "viewer_client/desktop/enabled.hpp"
 #include "viewer_client/desktop/tool_names.hpp"
 #include "viewer_client/scene/tool_groups.hpp"
 #include "viewer_client/scene/tool_pointer.hpp"
@@ -97,7 +98,7 @@ PropertiesPanel::PropertiesPanel(std::function<void(const Chosen&)> changed,
     if (!showing_) chosen_[tool_].law = law.toStdString();
     say();
   });
-  setEnabled(false);
+  set_enabled(*this, false, tr("Choose a tool on the left first."));
 }
 
 void PropertiesPanel::show_wear_and_law(const Tool& tool, bool held) {
@@ -115,7 +116,7 @@ void PropertiesPanel::show_wear_and_law(const Tool& tool, bool held) {
 
 void PropertiesPanel::show_tool(const std::string& name, bool held) {
   const Result<Tool> tool = find_tool(name);
-  setEnabled(tool.has_value());
+  set_enabled(*this, tool.has_value(), tr("Choose a tool on the left first."));
   if (!tool) return;
   showing_ = true;
   tool_ = name;
@@ -126,7 +127,7 @@ void PropertiesPanel::show_tool(const std::string& name, bool held) {
   }
   size_->setCurrentIndex(size_->findData(QString::fromStdString(name)));
   rpm_->setValue(static_cast<int>(tool->spindle_rpm));
-  rpm_->setEnabled(tool->spindle_rpm > 0.0);
+  set_enabled(*rpm_, tool->spindle_rpm > 0.0, tr("This tool has no spindle."));
   teeth_->setText(tool->teeth > 0 ? QString::number(tool->teeth) : QString("–"));
   feed_->setText(tool->feed_mm_per_rev > 0.0 ? tr("%1 mm").arg(QLocale().toString(tool->feed_mm_per_rev, 'g', 3))
                                              : QString("–"));
@@ -149,7 +150,8 @@ void PropertiesPanel::add_switch(QAction& action) {
   form_->addRow(box);
   connect(box, &QCheckBox::clicked, &action, &QAction::trigger);
   connect(&action, &QAction::toggled, box, &QCheckBox::setChecked);
-  connect(&action, &QAction::changed, box, [box, action = &action] { box->setEnabled(action->isEnabled()); });
+  connect(&action, &QAction::changed, box,
+          [box, action = &action] { set_enabled(*box, action->isEnabled(), action->toolTip()); });
 }
 
 PropertiesPanel::Chosen PropertiesPanel::chosen() const {

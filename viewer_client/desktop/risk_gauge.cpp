@@ -2,9 +2,11 @@
 
 #include <QLocale>
 #include <QSettings>
+#include <QStringList>
 #include <utility>
 
 #include "viewer_client/desktop/structure_names.hpp"
+#include "viewer_client/desktop/tool_names.hpp"
 
 namespace osteon {
 
@@ -28,7 +30,7 @@ void RiskGauge::set_plan(std::shared_ptr<const SurgicalPlan> plan) {
   plan_ = std::move(plan);
   distances_.reset();
   if (plan_) distances_.emplace(plan_);
-  show_tip({});
+  show_tools({});
 }
 
 void RiskGauge::set_limit_mm(double limit_mm) {
@@ -36,23 +38,39 @@ void RiskGauge::set_limit_mm(double limit_mm) {
   QSettings().setValue(kLimitKey, limit_mm);
 }
 
-void RiskGauge::show_tip(const std::optional<Vec3>& tip_mm) {
-  const auto found = tip_mm && distances_ ? distances_->nearest(*tip_mm) : std::nullopt;
-  setVisible(found.has_value());
-  if (!found) {
+QString RiskGauge::sentence_of(const NearestStructure& found, const QString& structure) const {
+  const QString distance = QLocale().toString(found.distance_mm, 'f', 1);
+  return found.inside                    ? tr("Inside %1").arg(structure)
+         : found.distance_mm < limit_mm_ ? tr("Near %1: %2 mm").arg(structure, distance)
+                                         : tr("%1: %2 mm").arg(structure, distance);
+}
+
+void RiskGauge::show_tools(std::span<const CuttingState> states) {
+  std::optional<NearestStructure> nearest;
+  QString nearest_tool;
+  QStringList of_each;
+  for (const CuttingState& state : states) {
+    if (state.tool_name.empty() || !distances_) continue;
+    const auto found = distances_->nearest(state.pose_bone_tool.position_mm);
+    if (!found) continue;
+    const QString tool = tool_title(state.tool_name);
+    of_each << tool + ": " + sentence_of(*found, structure_title(plan_->structures[found->structure].name));
+    if (nearest && found->distance_mm >= nearest->distance_mm) continue;
+    nearest = found;
+    nearest_tool = tool;
+  }
+  setVisible(nearest.has_value());
+  setToolTip(of_each.join('\n'));
+  if (!nearest) {
     clear();
     return;
   }
-  const QString whole = structure_title(plan_->structures[found->structure].name);
-  const QString name = fontMetrics().elidedText(whole, Qt::ElideRight, kNameWidth_px);
-  const QString distance = QLocale().toString(found->distance_mm, 'f', 1);
-  const bool warns = found->distance_mm < limit_mm_;
+  const bool warns = nearest->distance_mm < limit_mm_;
   if (warns != warns_) setStyleSheet(warns ? kWarning : "");
   warns_ = warns;
-  setToolTip(whole);
-  setText(found->inside ? tr("Inside %1").arg(name)
-          : warns       ? tr("Near %1: %2 mm").arg(name, distance)
-                        : tr("%1: %2 mm").arg(name, distance));
+  const QString whole = structure_title(plan_->structures[nearest->structure].name);
+  const QString sentence = sentence_of(*nearest, fontMetrics().elidedText(whole, Qt::ElideRight, kNameWidth_px));
+  setText(of_each.size() > 1 ? nearest_tool + ": " + sentence : sentence);
 }
 
 }  // namespace osteon

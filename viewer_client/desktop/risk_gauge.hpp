@@ -1,10 +1,12 @@
-// How far the tip of the tool is from the nearest structure at risk, in the status bar.
+// How far the tips of the tools are from the nearest structure at risk, in the status bar.
 #pragma once
 #include <QCoreApplication>
 #include <QLabel>
 #include <memory>
 #include <optional>
+#include <span>
 
+#include "common/mechanics/cutting_state.hpp"
 #include "viewer_client/scene/structure_distances.hpp"
 
 namespace osteon {
@@ -20,8 +22,9 @@ class RiskGauge : public QLabel {
 
   // Null: there is none.
   void set_plan(std::shared_ptr<const SurgicalPlan> plan);
-  // The tip in the bone's frame. None: no tool.
-  void show_tip(const std::optional<Vec3>& tip_mm);
+  // Of all people in the room. The gauge shows the tool that is nearest, and its tool tip shows each of them. Empty
+  // hands do not count. The name of a tool is shown where several people hold one.
+  void show_tools(std::span<const CuttingState> states);
 
   // Below this distance, mm, the gauge warns. The settings store it.
   [[nodiscard]] double limit_mm() const { return limit_mm_; }
@@ -29,6 +32,8 @@ class RiskGauge : public QLabel {
   [[nodiscard]] bool warns() const { return warns_; }
 
  private:
+  [[nodiscard]] QString sentence_of(const NearestStructure& found, const QString& structure) const;
+
   std::shared_ptr<const SurgicalPlan> plan_;  // shared with the picture
   std::optional<StructureDistances> distances_;
   double limit_mm_ = kUsualLimit_mm;

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "common/tools/tool.hpp"
+#include "viewer_client/desktop/enabled.hpp"
 #include "viewer_client/desktop/tool_icon.hpp"
 #include "viewer_client/desktop/tool_names.hpp"
 #include "viewer_client/scene/tool_groups.hpp"
@@ -54,6 +55,10 @@ void SurgeryToolBar::fill(QMenu& menu) {
     QMenu* part = menu.addMenu(group_title(std::string(group.name)));
     for (const std::string& name : group.tools) part->addAction(actions_.at(name));
   }
+}
+
+void SurgeryToolBar::set_tools_enabled(bool on, const QString& reason) {
+  for (const auto& [name, action] : actions_) set_enabled(*action, on, reason);
 }
 
 void SurgeryToolBar::show_held(const std::string& tool) {

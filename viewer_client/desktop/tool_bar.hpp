@@ -20,6 +20,8 @@ class SurgeryToolBar : public QToolBar {
 
   // The same actions, in groups, for a menu: everything in the window is in a menu too.
   void fill(QMenu& menu);
+  // In the bar and in the menu. `reason`: why they are disabled.
+  void set_tools_enabled(bool on, const QString& reason);
   // Shows which tool is held. Empty: none.
   void show_held(const std::string& tool);
   [[nodiscard]] QAction* action(const std::string& tool) const;

@@ -34,14 +34,14 @@ ViewOptions::ViewOptions(BoneView& view, QMenu& menu, const Add& add, Say say, Q
   add_switch(*overlays_, add, tr("Structures at risk"), "risks", QKeySequence("Ctrl+R"),
              [this](bool on) { view_.show_risks(on); });
   add_stereo(*menu.addMenu(tr("Stereo picture")), add);
-  QMenu& kept = *menu.addMenu(tr("Saved views"));
-  add(&kept, tr("Save this view"), "keep_view", QKeySequence("Ctrl+B"), [this] { keep_view(); });
-  add(&kept, tr("Delete the saved views"), "forget_views", {}, [this] { forget_views(); });
-  kept.addSeparator();
+  QMenu& saved = *menu.addMenu(tr("Saved views"));
+  add(&saved, tr("Save this view"), "save_view", QKeySequence("Ctrl+B"), [this] { save_view(); });
+  add(&saved, tr("Delete the saved views"), "delete_views", {}, [this] { delete_views(); });
+  saved.addSeparator();
   for (int number = 1; number <= kMostViews; ++number) {
     const QByteArray name = "view_" + QByteArray::number(number);
-    kept_.push_back(add(&kept, tr("View %1").arg(number), name.constData(), QKeySequence(QString("Alt+%1").arg(number)),
-                        [this, number] { look(number); }));
+    view_actions_.push_back(add(&saved, tr("View %1").arg(number), name.constData(),
+                                QKeySequence(QString("Alt+%1").arg(number)), [this, number] { look(number); }));
   }
   refresh();
 }
@@ -91,7 +91,7 @@ QString ViewOptions::key() const {
   return "views/" + QString(title_).replace('/', '-').replace('\\', '-');
 }
 
-void ViewOptions::keep_view() {
+void ViewOptions::save_view() {
   QSettings settings;
   QVariantList views = settings.value(key()).toList();
   if (views.size() >= kMostViews) return say_(tr("Nine views are saved already. Delete them first."));
@@ -101,7 +101,7 @@ void ViewOptions::keep_view() {
   say_(tr("Saved as view %1.").arg(views.size()));
 }
 
-void ViewOptions::forget_views() {
+void ViewOptions::delete_views() {
   QSettings().remove(key());
   refresh();
 }
@@ -119,7 +119,7 @@ void ViewOptions::look(int number) {
 
 void ViewOptions::refresh() {
   const int count = QSettings().value(key()).toList().size();
-  for (int i = 0; i < kMostViews; ++i) kept_[static_cast<std::size_t>(i)]->setVisible(i < count);
+  for (int i = 0; i < kMostViews; ++i) view_actions_[static_cast<std::size_t>(i)]->setVisible(i < count);
 }
 
 }  // namespace osteon

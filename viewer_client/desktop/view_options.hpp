@@ -39,8 +39,8 @@ class ViewOptions : public QObject {
   QAction* add_switch(QMenu& menu, const Add& add, const QString& words, const char* name, const QKeySequence& keys,
                       std::function<void(bool)> change);
   void set_stereo(StereoMode mode);
-  void keep_view();
-  void forget_views();
+  void save_view();
+  void delete_views();
   void look(int number);
   void refresh();
   [[nodiscard]] QString key() const;
@@ -50,7 +50,7 @@ class ViewOptions : public QObject {
   QString title_;
   QMenu* overlays_ = nullptr;
   std::vector<QAction*> stereo_;  // by StereoMode
-  std::vector<QAction*> kept_;
+  std::vector<QAction*> view_actions_;
 };
 
 }  // namespace osteon

@@ -298,7 +298,7 @@ Result<RoomSeq> PeopleClient::supervise(AuthorId subject, const Restrictions& su
   return RoomSeq{answer->room_seq()};
 }
 
-Result<std::pair<RoomSeq, std::size_t>> PeopleClient::undo(const WhatToUndo& what) {
+Result<std::pair<RoomSeq, std::size_t>> PeopleClient::undo(const UndoSelection& what) {
   v1::UndoRequest request;
   request.set_author(impl_->author());
   request.set_count(what.count);
@@ -357,7 +357,7 @@ Result<RoomSeq> PeopleClient::say(AuthorId to, const std::string& words) {
   return RoomSeq{answer->room_seq()};
 }
 
-Result<std::pair<AuthorId, std::size_t>> PeopleClient::demonstrate(const WhatToDemonstrate& what) {
+Result<std::pair<AuthorId, std::size_t>> PeopleClient::demonstrate(const DemonstrationSource& what) {
   v1::DemonstrateRequest request;
   request.set_author(impl_->author());
   request.set_room(what.room);

@@ -41,13 +41,13 @@ class PeopleClient final : public SupervisionClient {
   std::vector<WordsSeen> words() const override;
   bool wait(const std::function<bool()>& done, std::chrono::milliseconds patience) const override;
   Result<RoomSeq> supervise(AuthorId subject, const Restrictions& supervision) override;
-  Result<std::pair<RoomSeq, std::size_t>> undo(const WhatToUndo& what) override;
+  Result<std::pair<RoomSeq, std::size_t>> undo(const UndoSelection& what) override;
   Result<std::pair<RoomSeq, std::size_t>> redo(std::uint32_t count) override;
   Result<RoomSeq> mark(const std::string& label) override;
   Result<std::uint32_t> draw(const Annotation& drawn) override;
   Result<void> wipe_off(std::uint32_t annotation) override;
   Result<RoomSeq> say(AuthorId to, const std::string& words) override;
-  Result<std::pair<AuthorId, std::size_t>> demonstrate(const WhatToDemonstrate& what) override;
+  Result<std::pair<AuthorId, std::size_t>> demonstrate(const DemonstrationSource& what) override;
   Result<void> end_demonstration(AuthorId demonstrator) override;
   Result<std::vector<std::pair<std::string, Digest>>> tools() override;
   Result<RoomSeen> status() override;

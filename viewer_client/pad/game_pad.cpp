@@ -28,7 +28,7 @@ struct GamePad::Impl {
   bool started = false;
   SDL_GameController* pad = nullptr;
   std::string name;
-  PadState state;
+  GamePadState state;
 
   void close() {
     if (pad == nullptr) return;
@@ -94,9 +94,9 @@ bool GamePad::is_open() const { return impl_->pad != nullptr; }
 
 const std::string& GamePad::name() const { return impl_->name; }
 
-const PadState& GamePad::state() const { return impl_->state; }
+const GamePadState& GamePad::state() const { return impl_->state; }
 
-void GamePad::rumble(const PadRumble& strength) {
+void GamePad::rumble(const GamePadRumble& strength) {
   if (impl_->pad != nullptr)
     SDL_GameControllerRumble(impl_->pad, motor(strength.low), motor(strength.high), kRumble_ms);
 }

@@ -3,7 +3,7 @@
 #include <memory>
 #include <string>
 
-#include "viewer_client/pad/pad_control.hpp"
+#include "viewer_client/pad/game_pad_mapping.hpp"
 
 namespace osteon {
 
@@ -21,10 +21,10 @@ class GamePad {
   // Of the pad that was open last, for texts of the window.
   [[nodiscard]] const std::string& name() const;
   // As of the last poll(). At rest while no pad is open.
-  [[nodiscard]] const PadState& state() const;
+  [[nodiscard]] const GamePadState& state() const;
   // Sets the strength of the motors. It lasts until the next call, or ends at the first poll() after kRumble_ms. A pad
   // without motors ignores it.
-  void rumble(const PadRumble& strength);
+  void rumble(const GamePadRumble& strength);
   static constexpr unsigned kRumble_ms = 150;
 
  private:

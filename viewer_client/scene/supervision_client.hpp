@@ -49,7 +49,7 @@ struct RoomSeen {
 };
 
 // Exactly one of them is set.
-struct WhatToUndo {
+struct UndoSelection {
   std::uint32_t count = 0;
   AuthorId of{};  // with count; null: of all people
   RoomSeq to{};
@@ -57,7 +57,7 @@ struct WhatToUndo {
   bool all = false;
 };
 
-struct WhatToDemonstrate {
+struct DemonstrationSource {
   std::string room;      // empty: this one
   AuthorId of{};         // null: of all people
   RoomSeq from{}, to{};  // null: its beginning, its end
@@ -80,14 +80,14 @@ class SupervisionClient {
   // The sequence number of the event, or of the last of several. `subject` null: every hand that can be supervised.
   [[nodiscard]] virtual Result<RoomSeq> supervise(AuthorId subject, const Restrictions& supervision) = 0;
   [[nodiscard]] virtual Result<std::pair<RoomSeq, std::size_t>> undo(
-      const WhatToUndo& what) = 0;  // and the number of events
+      const UndoSelection& what) = 0;  // and the number of events
   [[nodiscard]] virtual Result<std::pair<RoomSeq, std::size_t>> redo(std::uint32_t count) = 0;
   [[nodiscard]] virtual Result<RoomSeq> mark(const std::string& label) = 0;
   [[nodiscard]] virtual Result<std::uint32_t> draw(const Annotation& drawn) = 0;         // its number
   [[nodiscard]] virtual Result<void> wipe_off(std::uint32_t annotation) = 0;             // 0: all of one's own
   [[nodiscard]] virtual Result<RoomSeq> say(AuthorId to, const std::string& words) = 0;  // null: to all
   // The demonstrator, and the number of cuts to be shown.
-  [[nodiscard]] virtual Result<std::pair<AuthorId, std::size_t>> demonstrate(const WhatToDemonstrate& what) = 0;
+  [[nodiscard]] virtual Result<std::pair<AuthorId, std::size_t>> demonstrate(const DemonstrationSource& what) = 0;
   [[nodiscard]] virtual Result<void> end_demonstration(AuthorId demonstrator) = 0;
   [[nodiscard]] virtual Result<std::vector<std::pair<std::string, Digest>>> tools() = 0;  // by name
   [[nodiscard]] virtual Result<RoomSeen> status() = 0;

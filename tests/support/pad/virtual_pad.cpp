@@ -37,7 +37,9 @@ bool VirtualPad::plug_in() {
   pad.name = "Virtual Pad";
   pad.userdata = this;
   pad.Rumble = [](void* self, Uint16 low, Uint16 high) {
-    static_cast<VirtualPad*>(self)->heard_.push_back({low, high});
+    auto& me = *static_cast<VirtualPad*>(self);
+    const std::lock_guard lock(me.mutex_);
+    me.heard_.push_back({low, high});
     return 0;
   };
   const int index = SDL_JoystickAttachVirtualEx(&pad);
@@ -50,6 +52,19 @@ bool VirtualPad::plug_in() {
   return true;
 }
 
+std::vector<VirtualPad::Motors> VirtualPad::heard() const {
+  const std::lock_guard lock(mutex_);
+  return heard_;
+}
+
+bool VirtualPad::quiet() const {
+  const std::lock_guard lock(mutex_);
+  return heard_.empty() || (heard_.back().low == 0 && heard_.back().high == 0);
+}
+
+void VirtualPad::lock_sdl() { SDL_LockJoysticks(); }
+void VirtualPad::unlock_sdl() { SDL_UnlockJoysticks(); }
+
 void VirtualPad::unplug() {
   if (joystick_ == nullptr) return;
   SDL_JoystickClose(static_cast<SDL_Joystick*>(joystick_));
@@ -58,7 +73,7 @@ void VirtualPad::unplug() {
     if (SDL_JoystickGetDeviceInstanceID(i) == instance_) return (void)SDL_JoystickDetachVirtual(i);
 }
 
-void VirtualPad::hold(const PadState& state) {
+void VirtualPad::hold(const GamePadState& state) {
   auto* joystick = static_cast<SDL_Joystick*>(joystick_);
   const auto axis = [&](int which, double share) { SDL_JoystickSetVirtualAxis(joystick, which, raw(share)); };
   axis(SDL_CONTROLLER_AXIS_LEFTX, state.left.x());

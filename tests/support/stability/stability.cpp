@@ -148,14 +148,14 @@ class Observer {
     const double step_n = grown(force_n, force_n_);
     const double slew_n = params_.slew_n_per_ms * 1e3 * params_.dt_s;
     result_.step_over_n = std::max(result_.step_over_n, step_n - slew_n - by_hand_n);
-    constexpr std::uint32_t kLetGo = kBreakthrough | kUncovered | kMissedTicks | kPushedAway;
-    if (touching && !(report.events & kLetGo)) {
+    constexpr std::uint32_t kReleased = kBreakthrough | kUncovered | kMissedTicks | kPushedAway;
+    if (touching && !(report.events & kReleased)) {
       const double explained_n = slew_n + by_hand_n + 2.0 * s * coupling_n_per_mm_ * report.contact.moved_mm.norm();
       result_.fall_n = std::max(result_.fall_n, force_n_.norm() - force_n.norm() - explained_n);
     }
     constexpr std::uint32_t kLess = kSlewLimited | kEnergyLimited | kRamping | kMissedTicks | kForceLimited;
     still_ = moved_by_mm < 1e-12 && report.contact.moved_mm.isZero() ? still_ + 1 : 0;
-    if (still_ > 20 && !(report.events & (kLess | kLetGo)) && report.cutting.phase == CuttingPhase::rubbing) {
+    if (still_ > 20 && !(report.events & (kLess | kReleased)) && report.cutting.phase == CuttingPhase::rubbing) {
       const double bone_n = report.coupling.force_n.norm();
       const double shown_n = s * (knee_n > 0.0 ? knee_n * std::log(1.0 + bone_n / knee_n) : bone_n);
       result_.still_off_n = std::max(result_.still_off_n, std::abs(force_n.norm() - shown_n));

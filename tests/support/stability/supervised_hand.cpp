@@ -85,7 +85,7 @@ void OverseenHand::hear() {
     count.taken += now.taken_by && !heard_.taken_by;
     count.given_back += (!now.taken_by && heard_.taken_by) || (!now.stopped && heard_.stopped);
     count.led += now.guide && !heard_.guide;
-    count.let_go += !now.guide && heard_.guide;
+    count.released += !now.guide && heard_.guide;
     count.limited += now.force_limit != heard_.force_limit;
     heard_ = now;
   }

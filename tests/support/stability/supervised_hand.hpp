@@ -28,7 +28,7 @@ struct OverseenRun {
 
 // Number of interventions while the tool touched bone.
 struct InContact {
-  int stopped = 0, taken = 0, given_back = 0, led = 0, let_go = 0, limited = 0, undone = 0;
+  int stopped = 0, taken = 0, given_back = 0, led = 0, released = 0, limited = 0, undone = 0;
 };
 
 // Measured at the handle.

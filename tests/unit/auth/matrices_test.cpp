@@ -117,7 +117,7 @@ class Member {
         note(said.has_scene() && said.scene().items_size() > 0, "session scene");
         note(said.has_partner(), "session tool_states");
         note(said.has_supervised(), "session own_supervision");
-        note(said.has_said(), "session own_words");
+        note(said.has_chat(), "session own_words");
         note(said.has_complete(), "session complete");
         note(said.has_committed() && said.committed().cut().author() == room.author.value, "own cut");
       }

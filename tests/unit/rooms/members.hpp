@@ -116,7 +116,7 @@ class Surgeon {
   }
   void take(const SceneSet& scene) { items_ = scene.items, seq_ = std::max(seq_, scene.seq); }
   void take(const HandSupervised&) {}
-  void take(const WordsSaid&) {}
+  void take(const ChatReceived&) {}
   void take(const EventNoted& noted) { seq_ = std::max(seq_, noted.seq); }
   void take(const Interrupted&) { interrupted_ = complete_, ++interruptions_; }
 

@@ -160,13 +160,13 @@ TEST(PeopleHost, ADecisionGoesToItsAuthorAndLeavesNoGapForOthers) {
 
   ASSERT_TRUE(lesson.ask([&](Room& room) { return room.say(lesson.instructor, lesson.other, "go on"); }));
   EXPECT_TRUE(lesson.sessions[lesson.trainee]->entries().back().has_noted());
-  ASSERT_TRUE(lesson.sessions[lesson.other]->entries().back().has_said());
-  EXPECT_EQ(lesson.sessions[lesson.other]->entries().back().said().words(), "go on");
+  ASSERT_TRUE(lesson.sessions[lesson.other]->entries().back().has_chat());
+  EXPECT_EQ(lesson.sessions[lesson.other]->entries().back().chat().words(), "go on");
   ASSERT_TRUE(lesson.ask([&](Room& room) { return room.say(lesson.instructor, {}, "all"); }));
   ASSERT_TRUE(lesson.ask([&](Room& room) { return room.annotate(lesson.instructor, {.points = {{1, 2, 3}}}); }));
   for (const auto& [author, session] : lesson.sessions) {
     const auto entries = session->entries();
-    EXPECT_EQ(entries[entries.size() - 2].said().words(), "all");
+    EXPECT_EQ(entries[entries.size() - 2].chat().words(), "all");
     EXPECT_TRUE(entries.back().has_noted()) << "the entry is an annotation";
     const auto seqs = session->seqs();
     for (std::size_t i = 1; i < seqs.size(); ++i) EXPECT_EQ(seqs[i].value, seqs[i - 1].value + 1) << "no gap";

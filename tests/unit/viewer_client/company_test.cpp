@@ -48,10 +48,10 @@ class SmallRoom final : public SupervisionClient {
     return said.back().place;
   }
   Result<RoomSeq> supervise(AuthorId, const Restrictions&) override { return refused(); }
-  Result<std::pair<RoomSeq, std::size_t>> undo(const WhatToUndo&) override { return refused(); }
+  Result<std::pair<RoomSeq, std::size_t>> undo(const UndoSelection&) override { return refused(); }
   Result<std::pair<RoomSeq, std::size_t>> redo(std::uint32_t) override { return refused(); }
   Result<RoomSeq> mark(const std::string&) override { return refused(); }
-  Result<std::pair<AuthorId, std::size_t>> demonstrate(const WhatToDemonstrate&) override { return refused(); }
+  Result<std::pair<AuthorId, std::size_t>> demonstrate(const DemonstrationSource&) override { return refused(); }
   Result<void> end_demonstration(AuthorId) override { return refused(); }
   Result<std::vector<std::pair<std::string, Digest>>> tools() override { return refused(); }
   Result<RoomSeen> status() override { return refused(); }

@@ -38,7 +38,7 @@ class FakeDesk final : public SupervisionClient {
         person.supervision = supervision, person.decided = RoomSeq{place_ + 1};
     return RoomSeq{++place_};
   }
-  Result<std::pair<RoomSeq, std::size_t>> undo(const WhatToUndo& what) override {
+  Result<std::pair<RoomSeq, std::size_t>> undo(const UndoSelection& what) override {
     undo_ = what;
     return std::pair(RoomSeq{++place_}, std::size_t{3});
   }
@@ -63,7 +63,7 @@ class FakeDesk final : public SupervisionClient {
     words_.push_back({RoomSeq{++place_}, self(), to, words});
     return RoomSeq{place_};
   }
-  Result<std::pair<AuthorId, std::size_t>> demonstrate(const WhatToDemonstrate& what) override {
+  Result<std::pair<AuthorId, std::size_t>> demonstrate(const DemonstrationSource& what) override {
     shown_ = what;
     late_ = {.author = {9}, .name = "demonstrator", .here = true, .hand = true};
     return std::pair(AuthorId{9}, std::size_t{12});
@@ -88,8 +88,8 @@ class FakeDesk final : public SupervisionClient {
   std::vector<Annotation> drawn_;
   std::vector<WordsSeen> words_;
   std::vector<std::pair<AuthorId, Restrictions>> asked_;
-  WhatToUndo undo_;
-  WhatToDemonstrate shown_;
+  UndoSelection undo_;
+  DemonstrationSource shown_;
   std::string label_;
   mutable std::chrono::milliseconds patience_{};
   std::uint64_t place_ = 10;

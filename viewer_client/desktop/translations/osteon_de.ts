@@ -249,6 +249,21 @@
     </message>
 </context>
 <context>
+    <name>GamePadController</name>
+    <message>
+        <source>The game pad</source>
+        <translation>Das Gamepad</translation>
+    </message>
+    <message>
+        <source>%1: choose a tool. The left stick moves it, the right trigger pushes.</source>
+        <translation>%1: Wählen Sie ein Werkzeug. Linker Stick bewegt es, rechter Trigger drückt.</translation>
+    </message>
+    <message>
+        <source>%1 was unplugged. It no longer leads the tool.</source>
+        <translation>%1 ist nicht mehr angeschlossen. Es führt das Werkzeug nicht mehr.</translation>
+    </message>
+</context>
+<context>
     <name>GaugesPanel</name>
     <message>
         <source>Push</source>
@@ -840,7 +855,7 @@
     </message>
     <message>
         <source>Warn when the tip is nearer than (mm):</source>
-        <translation>Warnen, wenn die Spitze näher ist als, mm</translation>
+        <translation>Warnen, wenn die Spitze näher ist als (mm):</translation>
     </message>
     <message>
         <source>I and U</source>
@@ -930,20 +945,25 @@
         <source>The haptic client starts again to show force in this way.</source>
         <translation>Das Haptikprogramm startet neu, um die Kraft so zu zeigen.</translation>
     </message>
-</context>
-<context>
-    <name>PadHand</name>
     <message>
-        <source>The game pad</source>
-        <translation>Das Gamepad</translation>
+        <source>Open a bone or join a room first.</source>
+        <translation>Öffnen Sie erst einen Knochen, oder betreten Sie einen Raum.</translation>
     </message>
     <message>
-        <source>%1: choose a tool. The left stick moves it, the right trigger pushes.</source>
-        <translation>%1: Wählen Sie ein Werkzeug. Linker Stick bewegt es, rechter Trigger drückt.</translation>
+        <source>You only watch this room.</source>
+        <translation>Sie sehen in diesem Raum nur zu.</translation>
     </message>
     <message>
-        <source>%1 was unplugged. It no longer leads the tool.</source>
-        <translation>%1 ist nicht mehr angeschlossen. Es führt das Werkzeug nicht mehr.</translation>
+        <source>This window moves no hand in this room.</source>
+        <translation>Dieses Fenster bewegt in diesem Raum keine Hand.</translation>
+    </message>
+    <message>
+        <source>A case is made or checked. Wait for it, or cancel it.</source>
+        <translation>Ein Fall wird erstellt oder geprüft. Warten Sie, oder brechen Sie ab.</translation>
+    </message>
+    <message>
+        <source>The server of this room has the bone.</source>
+        <translation>Der Server dieses Raums hat den Knochen.</translation>
     </message>
 </context>
 <context>
@@ -977,8 +997,8 @@
         <translation>osteon-audio ist nicht installiert. Installieren Sie das Paket osteon.</translation>
     </message>
     <message>
-        <source>Another window has this session open. Close it there first.</source>
-        <translation>Ein anderes Fenster hat diese Sitzung. Schließen Sie sie erst dort.</translation>
+        <source>Another window has this session open. Close it there, or wait until it has ended.</source>
+        <translation>Die Sitzung ist in einem anderen Fenster offen. Schließen Sie es, oder warten Sie.</translation>
     </message>
     <message>
         <source>%1 was ended by force or crashed.</source>
@@ -1046,6 +1066,14 @@
     <message>
         <source>Cutting blunts the tool further. The gauge shows how blunt it is.</source>
         <translation>Schneiden macht das Werkzeug stumpfer. Die Anzeige sagt, wie stumpf es ist.</translation>
+    </message>
+    <message>
+        <source>Choose a tool on the left first.</source>
+        <translation>Wählen Sie erst links ein Werkzeug.</translation>
+    </message>
+    <message>
+        <source>This tool has no spindle.</source>
+        <translation>Dieses Werkzeug hat keine Spindel.</translation>
     </message>
 </context>
 <context>

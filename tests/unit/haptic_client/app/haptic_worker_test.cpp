@@ -42,7 +42,7 @@ class StallingSession final : public Session {
   [[nodiscard]] HapticLoop& loop() noexcept override { return inner_.loop(); }
   [[nodiscard]] const ReadyPlan& plan() const noexcept override { return inner_.plan(); }
   [[nodiscard]] const std::vector<StepResult>& results() const noexcept override { return inner_.results(); }
-  [[nodiscard]] const std::vector<LeftItem>& left() const noexcept override { return inner_.left(); }
+  [[nodiscard]] const std::vector<PlacedItem>& left() const noexcept override { return inner_.left(); }
   [[nodiscard]] const HapticDevice& device() const noexcept override { return inner_.device(); }
   [[nodiscard]] int longest_wait() const { return longest_wait_; }  // ms, as the session was told
 

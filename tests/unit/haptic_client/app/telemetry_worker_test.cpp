@@ -30,13 +30,13 @@ class LeavingSession final : public Session {
   [[nodiscard]] HapticLoop& loop() noexcept override { return session_.loop(); }
   [[nodiscard]] const ReadyPlan& plan() const noexcept override { return session_.plan(); }
   [[nodiscard]] const std::vector<StepResult>& results() const noexcept override { return session_.results(); }
-  [[nodiscard]] const std::vector<LeftItem>& left() const noexcept override { return left_; }
+  [[nodiscard]] const std::vector<PlacedItem>& left() const noexcept override { return left_; }
   [[nodiscard]] const HapticDevice& device() const noexcept override { return session_.device(); }
 
  private:
   SimulatedSession session_;
-  LeftItem item_;
-  std::vector<LeftItem> left_;
+  PlacedItem item_;
+  std::vector<PlacedItem> left_;
 };
 
 class TelemetryWorkerTest : public testing::Test {

@@ -88,7 +88,7 @@ struct Heard {
                                         (now.supervision.stopped ? " stops" : " frees") + " until " +
                                         std::to_string(now.lease_epoch) + now.supervision.words);
                      },
-                     [&](const WordsSaid& said) {
+                     [&](const ChatReceived& said) {
                        events.push_back(std::to_string(said.seq.value) + ": " + std::to_string(said.from.value) +
                                         " says " + said.words);
                      },
@@ -235,9 +235,9 @@ TEST(SessionReader, AnInstructorsDecisionKeepsItsSequenceNumber) {
   ASSERT_TRUE(heard.reader.take(word(4, 13, false)));
   v1::SessionResponse said;
   said.set_index(3);
-  said.mutable_said()->set_room_seq(12);
-  said.mutable_said()->set_from(4);
-  said.mutable_said()->set_words("look here");
+  said.mutable_chat()->set_room_seq(12);
+  said.mutable_chat()->set_from(4);
+  said.mutable_chat()->set_words("look here");
   ASSERT_TRUE(heard.reader.take(said));
   EXPECT_EQ(heard.events,
             (std::vector<std::string>{"10 of 7", "11 stops until 12", "12: 4 says look here", "13 frees until 14"}));

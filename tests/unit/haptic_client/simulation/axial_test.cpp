@@ -154,7 +154,7 @@ TEST(ScrewStep, FollowsItsThreadAndStays) {
     last_s = time_s, last_mm = z;
   });
   ASSERT_TRUE(bench.session().done());
-  const std::vector<LeftItem>& left = bench.session().surgeon().left();
+  const std::vector<PlacedItem>& left = bench.session().surgeon().left();
   ASSERT_EQ(left.size(), 2u);
   // 240 turns a minute of 1.25 mm each are 5 mm/s. It is never more, and a little less because the driver droops under
   // its torque.

@@ -75,7 +75,7 @@ class PointedHand : public ::testing::Test {
     command_.push = true;
     return run(ticks, after);
   }
-  SessionTick let_go(int ticks, const std::function<void(const SessionTick&)>& after = {}) {
+  SessionTick release(int ticks, const std::function<void(const SessionTick&)>& after = {}) {
     command_.push = false;
     return run(ticks, after);
   }
@@ -124,7 +124,7 @@ TEST_F(PointedHand, IrrigationReachesTheToolsFlutes) {
     press(6000, [&](const SessionTick& now) {
       if (depth(now) < 4.0) full[irrigation] = std::max(full[irrigation], now.report.cutting.flutes_full);
     });
-    let_go(10);
+    release(10);
   }
   std::printf("flutes: %.3f dry, %.3f under irrigation\n", full[0], full[1]);
   EXPECT_GT(full[0], 0.05);
@@ -241,7 +241,7 @@ TEST_F(PointedHand, SilenceEndsPushAndSpindle) {
   EXPECT_EQ(phase(), PointerPhase::rests);
   EXPECT_GT(back.commanded_rpm, 0.0);
   EXPECT_EQ(removed(), before);
-  let_go(100);
+  release(100);
   press(4000);
   EXPECT_GT(removed(), before);
 }
@@ -274,17 +274,17 @@ TEST_F(PointedHand, LetsGoAtABreakthroughAndNotInMarrow) {
   begin();
   command_.push_n = 40.0;
   run(1500);
-  double let_go_mm = 0.0;
+  double released_mm = 0.0;
   press(15000, [&](const SessionTick& now) {
-    if (phase() == PointerPhase::reacts && let_go_mm == 0.0) let_go_mm = depth(now);
+    if (phase() == PointerPhase::reacts && released_mm == 0.0) released_mm = depth(now);
   });
   EXPECT_EQ(phase(), PointerPhase::reacts);
-  EXPECT_NEAR(let_go_mm, kThickness_mm, 1.0);
+  EXPECT_NEAR(released_mm, kThickness_mm, 1.0);
   const double settled_mm = depth(run(1000));
   const SessionTick held = run(3000, [&](const SessionTick&) { ASSERT_EQ(phase(), PointerPhase::reacts); });
   EXPECT_NEAR(depth(held), settled_mm, 0.01) << "it is neither pushed nor drawn";
 
-  let_go(3000);
+  release(3000);
   EXPECT_EQ(phase(), PointerPhase::rests);
   press(100);
   EXPECT_EQ(phase(), PointerPhase::pushes);
@@ -299,7 +299,7 @@ TEST_F(PointedHand, WithdrawsAlongItsAxis) {
   ASSERT_EQ(phase(), PointerPhase::pushes);
   double off_mm = 0.0, deepest_mm = 0.0;
   double before_mm = 1e9;
-  let_go(3000, [&](const SessionTick& now) {
+  release(3000, [&](const SessionTick& now) {
     if (phase() != PointerPhase::withdraws) return;
     const Vec3 from_mm = now.report.pose_bone_proxy.position_mm - kAt_mm;
     const double deep_mm = from_mm.dot(axis);
@@ -368,7 +368,7 @@ TEST_F(PointedHand, ComesOutBeforeItFollowsThePointer) {
     run(50);
   }
   double most_n = 0.0, sideways_mm = 0.0;
-  const SessionTick last = let_go(3000, [&](const SessionTick& now) {
+  const SessionTick last = release(3000, [&](const SessionTick& now) {
     if (phase() != PointerPhase::rests) return;
     most_n = std::max(most_n, now.report.coupling.force_n.norm());
     const Vec3& tip_mm = now.report.pose_bone_proxy.position_mm;
@@ -448,7 +448,7 @@ TEST_F(PointedHand, AnotherToolComesIntoTheHand) {
   command_.spindle_rpm = 33.0;  // of the bur
   EXPECT_GT(depth(run(500, keeps)), 0.5);
   EXPECT_EQ(phase(), PointerPhase::pushes);
-  const SessionTick last = let_go(3000, keeps);
+  const SessionTick last = release(3000, keeps);
   EXPECT_EQ(phase(), PointerPhase::rests);
   EXPECT_EQ(last.report.tool, burr);
   EXPECT_EQ(last.commanded_rpm, 33.0);
@@ -511,7 +511,7 @@ TEST_F(PointedHand, WearAndLawAreThoseOfTheToolThatTheMessageNames) {
   run(1500);
   press(3000);
   EXPECT_GT(state().wear, 1.5);
-  let_go(3000);
+  release(3000);
   const double worn = state().wear;
   EXPECT_LT(worn, 1.51);
   command_.tool = tool_named("burr-round-5");
@@ -552,7 +552,7 @@ TEST_F(PointedHand, GetsTheForceAsItIsChosen) {
     std::printf("  bone %.2f N, hand %.2f N, by hand %.2f N\n", bone_n, hand_n, expected_n);
     // The motor's drag and the cue have no mean along the axis.
     EXPECT_NEAR(hand_n, expected_n, 0.05 * expected_n);
-    let_go(10);
+    release(10);
   }
 }
 

@@ -306,7 +306,7 @@ class Sigma : public WithArm {
     sample_ = device_->read().sample;
   }
   // The hand moves the handle back to where it began. Nobody presses and nothing pushes.
-  bool let_go() {
+  bool release() {
     device_->write({});
     arm().hand(0.0, 0.0, 0.0);
     arm()->until = arm()->cycles + 2000;
@@ -337,7 +337,7 @@ class Sigma : public WithArm {
 TEST_F(Sigma, AWallsTorqueReachesItsMotors) {
   ASSERT_TRUE(device_->open());
   EXPECT_EQ(device_->limits().peak_nmm, 200.0);
-  ASSERT_TRUE(let_go());
+  ASSERT_TRUE(release());
   Before side(wall(), Vec3(0, 0, 0), Vec3(-1, 0, 0), *device_);
   ASSERT_TRUE(press(side));
   const double shown_by = side.force_scale() / side.workspace_scale();

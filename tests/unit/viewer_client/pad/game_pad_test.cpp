@@ -31,7 +31,7 @@ TEST_F(GamePadTest, APadThatIsPluggedInIsOpenedAndItsControlsAreRead) {
   ASSERT_EQ(pad_.poll(), Change::opened);
   EXPECT_EQ(pad_.name(), "Virtual Pad");
 
-  PadState held;
+  GamePadState held;
   held.left = Vector2d(0.5, 0.25);  // to the right and up
   held.right = Vector2d(-1.0, -0.75);
   held.right_trigger = 0.5;
@@ -39,7 +39,7 @@ TEST_F(GamePadTest, APadThatIsPluggedInIsOpenedAndItsControlsAreRead) {
   held.a = held.shoulder = true;
   plug_.hold(held);
   EXPECT_EQ(pad_.poll(), Change::none);
-  const PadState& read = pad_.state();
+  const GamePadState& read = pad_.state();
   EXPECT_NEAR((read.left - held.left).norm(), 0.0, 2 * kStep);
   EXPECT_NEAR((read.right - held.right).norm(), 0.0, 2 * kStep);
   EXPECT_NEAR(read.right_trigger, 0.5, 2 * kStep);
@@ -55,7 +55,7 @@ TEST_F(GamePadTest, APadThatIsPluggedInIsOpenedAndItsControlsAreRead) {
 TEST_F(GamePadTest, AnUnpluggedPadIsAtRestAndTheNextOneIsTaken) {
   ASSERT_TRUE(plug_.plug_in());
   ASSERT_EQ(pad_.poll(), Change::opened);
-  PadState held;
+  GamePadState held;
   held.right_trigger = 1.0;
   plug_.hold(held);
   (void)pad_.poll();

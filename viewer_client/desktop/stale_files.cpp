@@ -1,4 +1,4 @@
-#include "viewer_client/desktop/leftovers.hpp"
+#include "viewer_client/desktop/stale_files.hpp"
 
 #include <signal.h>
 #include <unistd.h>
@@ -40,20 +40,20 @@ void remove_from(const std::filesystem::path& folder, Goes goes) {
 
 }  // namespace
 
-Leftovers::Leftovers(std::filesystem::path sockets) : sockets_(std::move(sockets)) {
+StaleFiles::StaleFiles(std::filesystem::path sockets) : sockets_(std::move(sockets)) {
   std::error_code ignored;
   std::filesystem::create_directories(data_folder(), ignored);
   windows_ = std::make_unique<FileLock>(data_folder() / "windows.lock");
-  if (windows_->try_alone()) clear();
+  if (windows_->try_alone()) remove();
   windows_->wait_shared();
 }
 
-Leftovers::~Leftovers() {
-  if (windows_->try_alone()) clear();
+StaleFiles::~StaleFiles() {
+  if (windows_->try_alone()) remove();
 }
 
 // Only while no other window is there: one that has just unpacked a file has no session yet.
-void Leftovers::clear() {
+void StaleFiles::remove() {
   std::set<std::filesystem::path> needed;
   for (const std::filesystem::path& bone : remembered_bones()) needed.insert(bone.filename());
   remove_from(cases_folder(), [&](const std::filesystem::directory_entry& entry) {

@@ -8,17 +8,17 @@
 
 namespace osteon {
 
-// Each window has one, as long as it is open. The first window to open and the last one to close remove the leftovers.
-class Leftovers {
+// Each window has one, as long as it is open. The first window to open and the last one to close remove them.
+class StaleFiles {
  public:
   // `sockets`: the folder of the windows' sockets.
-  explicit Leftovers(std::filesystem::path sockets);
-  ~Leftovers();
-  Leftovers(const Leftovers&) = delete;
-  Leftovers& operator=(const Leftovers&) = delete;
+  explicit StaleFiles(std::filesystem::path sockets);
+  ~StaleFiles();
+  StaleFiles(const StaleFiles&) = delete;
+  StaleFiles& operator=(const StaleFiles&) = delete;
 
  private:
-  void clear();
+  void remove();
 
   std::filesystem::path sockets_;
   std::unique_ptr<FileLock> windows_;  // shared by all windows

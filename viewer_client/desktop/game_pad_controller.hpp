@@ -4,23 +4,23 @@
 #include <QElapsedTimer>
 #include <functional>
 
-#include "viewer_client/pad/game_pad.hpp"
-#include "viewer_client/pad/pad_control.hpp"
+#include "viewer_client/pad/game_pad_mapping.hpp"
+#include "viewer_client/pad/game_pad_reader.hpp"
 
 namespace osteon {
 
 class BoneView;
 
 // What the pad's motors show. Zero while no recent state is known.
-struct PadFeel {
+struct RumbleInput {
   double force_n = 0;  // on the hand
   double most_n = 0;   // the most that the hand's device holds for long
   bool cuts = false;   // the tool removes material
 };
 
 // [GUI thread]
-class PadHand {
-  Q_DECLARE_TR_FUNCTIONS(PadHand)
+class GamePadController {
+  Q_DECLARE_TR_FUNCTIONS(GamePadController)
 
  public:
   struct Events {
@@ -28,22 +28,22 @@ class PadHand {
     std::function<void()> undo;
   };
 
-  PadHand(BoneView& view, Events events);
+  GamePadController(BoneView& view, Events events);
 
-  // Reads the pad, moves the tool and sets the motors. Call it at the rate at which the pad is to be read. Without a
-  // pad it only looks for one, once a second. `may_act`: this window is in front. Otherwise it does what rest() does.
-  void tick(bool may_act, const PadFeel& feel);
+  // Takes what was read of the pad, moves the tool and sets the motors. Call it once a frame. `may_act`: this window is
+  // in front. Otherwise it does what rest() does.
+  void tick(bool may_act, const RumbleInput& feel);
   // For a pause between ticks: releases all controls and stops the motors.
   void rest();
 
  private:
-  void let_go();
+  void release_all();
 
   BoneView& view_;
   Events events_;
-  GamePad pad_;
-  PadControl control_;
-  QElapsedTimer ticked_, looked_;
+  GamePadReader pad_;
+  GamePadMapping mapping_;
+  QElapsedTimer ticked_;
 };
 
 }  // namespace osteon

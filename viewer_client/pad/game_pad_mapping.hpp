@@ -1,4 +1,4 @@
-// Turns the controls of a game pad into orders for the tool, and a force into the strength of the pad's motors. Pure
+// Turns the controls of a game pad into commands for the tool, and a force into the strength of the pad's motors. Pure
 // numbers: no device, no I/O and no clock.
 #pragma once
 #include <optional>
@@ -8,14 +8,14 @@
 namespace osteon {
 
 // A game pad's controls.
-struct PadState {
+struct GamePadState {
   Eigen::Vector2d left = Eigen::Vector2d::Zero(), right = Eigen::Vector2d::Zero();  // sticks, −1 … 1: x right, y up
   double left_trigger = 0, right_trigger = 0;                                       // 0 … 1
   bool a = false, b = false, shoulder = false;                                      // shoulder: any of the two
 };
 
 // What the pad asks for in one tick.
-struct PadOrder {
+struct GamePadCommand {
   // Motion of the tool across the picture, and its turn: fractions −1 … 1 of the fastest, x right, y up.
   Eigen::Vector2d slide = Eigen::Vector2d::Zero(), turn = Eigen::Vector2d::Zero();
   bool push = false, push_begins = false;  // the right trigger is pulled; since this tick
@@ -33,17 +33,17 @@ struct PadOrder {
 [[nodiscard]] Eigen::Vector2d shaped_stick(const Eigen::Vector2d& stick, double rest) noexcept;
 
 // [one thread]
-class PadControl {
+class GamePadMapping {
  public:
   static constexpr double kStickRest = 0.15;
   // Hysteresis: a trigger counts as pulled above kTriggerPulled, until it is below kTriggerRest. The push grows
   // linearly from kTriggerPulled on, so that it begins with the least push.
   static constexpr double kTriggerRest = 0.08, kTriggerPulled = 0.12;
 
-  [[nodiscard]] PadOrder step(const PadState& state) noexcept;
+  [[nodiscard]] GamePadCommand step(const GamePadState& state) noexcept;
   // Releases all controls: the pad is unplugged, or another window is in front. A trigger or button counts again only
   // after it has been at rest, so that one that was held all the time does not push.
-  [[nodiscard]] PadOrder let_go() noexcept;
+  [[nodiscard]] GamePadCommand release_all() noexcept;
 
  private:
   // Whether a button or trigger is held. One that was held when the pad was plugged in counts from its next press on.
@@ -56,15 +56,15 @@ class PadControl {
 };
 
 // Shares of the two motors' full strength, 0 … 1: the heavy slow one, and the light fast one.
-struct PadRumble {
+struct GamePadRumble {
   double low = 0, high = 0;
-  friend bool operator==(const PadRumble&, const PadRumble&) = default;
+  friend bool operator==(const GamePadRumble&, const GamePadRumble&) = default;
 };
 
 // The heavy motor follows the force on the hand as sqrt(F / F_most): motors hardly turn at a tenth of their strength,
 // so a proportional law would hide a light touch. The light motor runs at half of that strength while the tool cuts.
 // Both rest below kFelt_n, where only the hand's tremor is left, and while F_most is not known (0).
 inline constexpr double kFelt_n = 0.3;
-[[nodiscard]] PadRumble rumble_of(double force_n, double most_n, bool cuts) noexcept;
+[[nodiscard]] GamePadRumble rumble_of(double force_n, double most_n, bool cuts) noexcept;
 
 }  // namespace osteon
