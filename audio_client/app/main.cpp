@@ -262,7 +262,7 @@ Result<void> run(const Options& options, const StopSignal& stop) {
     recorder = std::move(*opened);
     engine.record_to(*recorder);
   }
-  audio::move_to_bone(*space, room->bounds.centre_mm());
+  audio::move_to_middle(*space, room->bounds.centre_mm());
   engine.listen(*space);
   if (output.opened())
     if (Result<void> started = output.start(); !started && !window->there()) return started;
@@ -345,7 +345,7 @@ int main(int argc, char** argv) {
       ->capture_default_str();
   app.add_option("--device", options.device,
                  "Name or number of a sink, as osteon-audio devices lists them; by default, the server's own choice");
-  audio::add_listening(app, options.listening);
+  audio::add_listening(app, options.listening, "the bone");
   app.add_option("--preset", options.presets,
                  "Preset of a tool's sound, or a folder of presets, which go before those of Osteon; may be repeated")
       ->allow_extra_args(false);
