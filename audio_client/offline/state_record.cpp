@@ -22,12 +22,13 @@ struct NamedNumber {
 
 // The first number that no session has, or nothing.
 std::optional<NamedNumber> impossible(const CuttingState& state) {
-  const std::array<NamedNumber, 9> numbers = {
+  const std::array<NamedNumber, 10> numbers = {
       {{"rpm", state.spindle_rpm, 0.0, kMostRecordedRpm},
        {"force", state.force_physical_N.norm(), 0.0, kMostNumber},
        {"torque", state.torque_Nmm, -kMostNumber, kMostNumber},
        {"feed", state.feed_mm_per_s, -kMostNumber, kMostNumber},
        {"density", state.density_g_cm3, 0.0, 100.0},
+       {"engaged share", state.engaged_fraction, 0.0, 1.0},
        {"position of the tip", state.pose_bone_tool.position_mm.norm(), 0.0, kMostNumber},
        {"cortex", state.cortex_mm, 0.0, kMostNumber},
        {"seated", state.seated, 0.0, 1.0},

@@ -236,6 +236,7 @@ TEST(StateRecord, ReadsWhatTheHapticClientWrites) {
       ASSERT_EQ((*state)->spindle_rpm, expected.report.spindle_rpm);
       ASSERT_EQ((*state)->feed_mm_per_s, expected.report.cutting.feed_mm_per_s);
       ASSERT_EQ((*state)->density_g_cm3, 1.5);
+      ASSERT_EQ((*state)->engaged_fraction, 0.75);
       ASSERT_EQ((*state)->torque_Nmm, expected.report.cutting.torque_nmm);
       ASSERT_EQ((*state)->force_physical_N.norm(), 5.0);
       ASSERT_EQ((*state)->pose_bone_tool.position_mm, Vec3(1, 2, 3));
