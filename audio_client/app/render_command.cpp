@@ -16,6 +16,7 @@
 #include "audio_client/app/listening_option.hpp"
 #include "audio_client/app/output_file.hpp"
 #include "audio_client/app/preset_command.hpp"
+#include "audio_client/app/recording_option.hpp"
 #include "audio_client/offline/offline_sound.hpp"
 #include "audio_client/offline/state_record.hpp"
 #include "common/runtime/progress.hpp"
@@ -36,7 +37,7 @@ struct RenderArguments {
   std::vector<std::string> presets;
 };
 
-std::string summary(const RenderArguments& a, const OfflineSound& sound, double work_s) {
+std::string summary(const RenderArguments& a, const OfflineSound& sound, const std::string& note, double work_s) {
   const double seconds = static_cast<double>(sound.frames) / a.rate_hz;
   const double peak_db = sound.peak > 0 ? 20.0 * std::log10(static_cast<double>(sound.peak)) : sound::kSilence_db;
   std::array<char, 256> text{};
@@ -46,7 +47,7 @@ std::string summary(const RenderArguments& a, const OfflineSound& sound, double 
                 "made       in %.3f s, %.0f times as fast as it sounds\n",
                 static_cast<unsigned long long>(sound.states), seconds, a.rate_hz, peak_db, a.listening.listen.c_str(),
                 work_s, seconds / work_s);
-  return text.data() + ("written    " + a.out + "\n");
+  return text.data() + (note.empty() ? "" : "note       " + note + "\n") + "written    " + a.out + "\n";
 }
 
 // A bar that appears with the first work, so that a refused record prints only its sentence.
@@ -122,7 +123,7 @@ Result<std::string> run_render(const RenderArguments& a) {
       a.out, {.rate_hz = a.rate_hz, .channels = params->space.listening == Listening::mono ? 1 : 2, .bits = a.bits});
   if (!writer) return tl::unexpected(writer.error());
 
-  const StopSignal stop;
+  const StopSignal stop(StopSignal::HangUp::stops);
   const auto begin = std::chrono::steady_clock::now();
   const auto looked = look_at_work(params->space, a.record, stop);
   const Result<OfflineSound> sound =
@@ -132,7 +133,7 @@ Result<std::string> run_render(const RenderArguments& a) {
   if (!sound) return tl::unexpected(sound.error());
   if (auto closed = writer->close(); !closed) return tl::unexpected(closed.error());
   const std::chrono::duration<double> work = std::chrono::steady_clock::now() - begin;
-  return summary(a, *sound, work.count());
+  return summary(a, *sound, (*record)->unknown_tool(), work.count());
 }
 
 }  // namespace
@@ -152,6 +153,7 @@ void add_render_command(CLI::App& app, std::function<Result<std::string>()>& cho
       ->capture_default_str();
   command->add_option("--bits", a.bits, "Of a sample: 16 or 24")->check(CLI::IsMember({16, 24}))->capture_default_str();
   command->add_option("--seed", a.seed, "Of the noise: the same gives the same sound; the live one has 1")
+      ->check(whole_number())
       ->capture_default_str();
   command
       ->add_option("--preset", a.presets,

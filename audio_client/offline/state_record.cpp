@@ -6,6 +6,8 @@
 #include <string_view>
 
 #include "audio_client/offline/state_sources.hpp"
+#include "common/core/bounded_text.hpp"
+#include "common/tools/tool.hpp"
 
 namespace osteon::audio {
 namespace {
@@ -40,6 +42,16 @@ std::optional<NamedNumber> impossible(const CuttingState& state) {
 
 }  // namespace
 
+void StateRecord::note_tool(const std::string& name) {
+  if (name == last_tool_ || !unknown_tool_.empty()) return;
+  last_tool_ = name;
+  if (name.empty() || find_tool(name)) return;
+  std::string known;
+  for (const Tool& tool : builtin_tools()) known += (known.empty() ? "" : ", ") + tool.name;
+  unknown_tool_ = place("tool") + "is \"" + bounded_text(name, 60) +
+                  "\", which this program does not know, so it sounds like a drill; known are " + known;
+}
+
 Result<std::optional<CuttingState>> StateRecord::next() {
   auto state = read();
   if (!state || !*state) return state;
@@ -56,6 +68,7 @@ Result<std::optional<CuttingState>> StateRecord::next() {
   if (static_cast<double>(time_ns) - static_cast<double>(*first_ns_) > 1e9 * kLongestSession_s)
     return bad_input(place("mono_ns") + "is more than 4 hours after the first; give a record of one session");
   last_ns_ = time_ns;
+  note_tool((*state)->tool_name);
   return state;
 }
 

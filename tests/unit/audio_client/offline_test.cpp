@@ -422,17 +422,69 @@ TEST(RenderCommand, RefusesToLoseTheRecord) {
   EXPECT_EQ(*read_file(temp / "log.csv"), long_log(10));
 }
 
-TEST(RenderCommand, LeavesNoPartOfASoundWhenItIsStopped) {
+class RenderStopped : public testing::TestWithParam<int> {};
+
+TEST_P(RenderStopped, LeavesNoPartOfASound) {
+  std::signal(SIGHUP, SIG_DFL);  // perhaps the tests were started by nohup
   const test::TempDir temp;
   ASSERT_TRUE(write_file(temp / "log.csv", long_log(120 * 1800)));
   test::Process audio(test::program("osteon-audio"),
                       {"render", (temp / "log.csv").string(), "--out", (temp / "x.wav").string()});
   ASSERT_TRUE(audio.wait_for_percent(1, 60s)) << audio.err();
-  audio.signal(SIGINT);
+  audio.signal(GetParam());
   EXPECT_EQ(audio.wait(30s), 130);
   EXPECT_THAT(audio.err(), HasSubstr("stopped"));
   for (const auto& entry : std::filesystem::directory_iterator(temp.path()))
     EXPECT_EQ(entry.path().filename(), "log.csv");
+}
+
+INSTANTIATE_TEST_SUITE_P(EachSignal, RenderStopped, testing::Values(SIGINT, SIGTERM, SIGHUP));
+
+// The shell's limit on the size of files, 64 blocks of 1024 bytes.
+TEST(RenderCommand, SaysThatTheFileBecomesTooLarge) {
+  const test::TempDir temp;
+  ASSERT_TRUE(write_file(temp / "log.csv", long_log(1200)));
+  ASSERT_TRUE(write_file(temp / "x.wav", "an older sound"));
+  const auto ran =
+      test::run("bash", {"-c", "ulimit -f 64 && exec \"$@\"", "render", test::program("osteon-audio").string(),
+                         "render", (temp / "log.csv").string(), "--out", (temp / "x.wav").string()});
+  EXPECT_EQ(ran.exit_code, 1);
+  EXPECT_THAT(ran.err, AllOf(HasSubstr("x.wav could not be written whole (File too large)"),
+                             HasSubstr("an older file of that name is as it was")));
+  EXPECT_EQ(*read_file(temp / "x.wav"), "an older sound");
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(temp.path()), {}), 2);
+}
+
+TEST(RenderCommand, TakesNoSeedThatItWouldChange) {
+  const test::TempDir temp;
+  ASSERT_TRUE(write_file(temp / "log.csv", long_log(10)));
+  const auto render = [&](const char* seed) {
+    return test::run(test::program("osteon-audio"),
+                     {"render", (temp / "log.csv").string(), "--out", (temp / "x.wav").string(), "--seed", seed});
+  };
+  for (const char* seed : {"-1", "18446744073709551616", "1.5"}) {
+    const auto ran = render(seed);
+    EXPECT_EQ(ran.exit_code, 1);
+    EXPECT_THAT(ran.err, HasSubstr(std::string("--seed: ") + seed + " is no whole number"));
+  }
+  EXPECT_EQ(render("18446744073709551615").exit_code, 0);
+}
+
+TEST(RenderCommand, NamesAToolThatItDoesNotKnow) {
+  const test::TempDir temp;
+  std::string log = long_log(10);
+  const auto render = [&] {
+    EXPECT_TRUE(write_file(temp / "log.csv", log));
+    const auto ran = test::run(test::program("osteon-audio"),
+                               {"render", (temp / "log.csv").string(), "--out", (temp / "x.wav").string()});
+    EXPECT_EQ(ran.exit_code, 0) << ran.err;
+    return ran.out;
+  };
+  EXPECT_THAT(render(), testing::Not(HasSubstr("note")));
+  const std::size_t row = log.find("drill-3.2", log.find("drill-3.2") + 1);
+  log.replace(row, 9, "drill3.2");
+  EXPECT_THAT(render(), AllOf(HasSubstr("log.csv: line 3: tool is \"drill3.2\""), HasSubstr("sounds like a drill"),
+                              HasSubstr("known are"), HasSubstr("drill-3.2"), HasSubstr("burr-round-5")));
 }
 
 }  // namespace
