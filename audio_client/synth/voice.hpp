@@ -75,7 +75,7 @@ class Voice {
 
   double recent_load_ = 0, recent_bone_g_cm3_ = 0;           // fall slowly: those of a moment ago
   Vec3 bone_tip_mm_ = Vec3::Zero(), way_mm_ = Vec3::Zero();  // the tip when it was in bone, and its last way there
-  double since_bone_s_ = 0;
+  double since_bone_s_ = 1;                                  // it was in none yet
   ModalBank burst_, modes_;
   std::uint32_t blows_ = 0;
   std::size_t click_at_ = 0, click_ = 0;  // of a recorded click
