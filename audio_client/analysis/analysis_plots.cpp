@@ -4,6 +4,8 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <optional>
+#include <string_view>
 
 #include "audio_client/analysis/plot.hpp"
 #include "common/sound/levels.hpp"
@@ -38,12 +40,21 @@ void mark_states(Plot& plot, const SoundAnalysis& a, const Axis& vertical) {
     plot.bar(span.from_s, span.to_s, vertical.low, vertical.high, picture::mixed(kPaper, colour_of(span.state), 0.18));
 }
 
-void name_states(Plot& plot, const SoundAnalysis& a) {
-  int line = 0;
+// `ink`: of all names; without it, each has the colour of its state.
+void name_states(Plot& plot, const SoundAnalysis& a, std::optional<Colour> ink = std::nullopt) {
+  for (const sound::StateSpan& span : a.states) plot.vertical_line(span.from_s, ink.value_or(colour_of(span.state)));
+  // Names of short spans would lie on each other: each takes the first line that is free there. Where none is, as in a
+  // recording of hundreds of spans, the colour tells the state.
+  constexpr int kLines = 8, kLineHeight = 10, kGap = 4;
+  std::array<int, kLines> taken_to{};
   for (const sound::StateSpan& span : a.states) {
-    plot.vertical_line(span.from_s, colour_of(span.state));
-    // Names of short spans would lie on each other.
-    plot.note(span.from_s, 3 + 10 * (line++ % 3), sound::name(span.state), colour_of(span.state));
+    const std::string_view name = sound::name(span.state);
+    const int from = plot.note_column(span.from_s, name);
+    const auto line = std::ranges::find_if(taken_to, [&](int to) { return to <= from; });
+    if (line == taken_to.end()) continue;
+    *line = from + picture::text_width(name) + kGap;
+    plot.note(span.from_s, 3 + kLineHeight * static_cast<int>(line - taken_to.begin()), name,
+              ink.value_or(colour_of(span.state)));
   }
 }
 
@@ -122,10 +133,7 @@ NamedPicture spectrogram(const SoundAnalysis& a) {
     const auto bin = std::min(s.bins - 1, static_cast<std::size_t>(std::lround(y / s.bin_hz)));
     return heat(1.0 + (sound::power_db(s.at(column, bin)) - loudest_db) / kRange_db);
   });
-  for (const sound::StateSpan& span : a.states) {
-    plot.vertical_line(span.from_s, kPaper);
-    plot.note(span.from_s, 4, sound::name(span.state), kPaper);
-  }
+  name_states(plot, a, kPaper);
   std::array<char, 96> scale{};
   std::snprintf(scale.data(), scale.size(), "dark: %.0f dB, light: %.0f dB re full scale, each bin of %.0f Hz",
                 loudest_db - kRange_db, loudest_db, s.bin_hz);

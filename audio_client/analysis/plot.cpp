@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <vector>
 
 namespace osteon::audio {
 namespace {
@@ -22,6 +23,14 @@ double tick_step(const Axis& axis, int count) {
   return 10.0 * power;
 }
 
+// The multiples of a step that are on the axis.
+std::vector<double> ticks(const Axis& axis, double step) {
+  std::vector<double> places;
+  const double first = std::ceil(axis.low / step);
+  for (int i = 0; (first + i) * step <= axis.high + 1e-9 * step; ++i) places.push_back((first + i) * step);
+  return places;
+}
+
 std::string tick_text(double value, double step) {
   std::array<char, 32> text{};
   const int digits = std::clamp(static_cast<int>(-std::floor(std::log10(step) + 1e-9)), 0, 6);
@@ -36,14 +45,14 @@ Plot::Plot(picture::Picture& picture, const Frame& frame, const Axis& horizontal
     : picture_(picture), frame_(frame), horizontal_(horizontal), vertical_(vertical) {
   const int bottom = frame.y + frame.height;
   const double step_x = tick_step(horizontal, frame.width / 90), step_y = tick_step(vertical, frame.height / 18);
-  for (double x = std::ceil(horizontal.low / step_x) * step_x; x <= horizontal.high + 1e-9 * step_x; x += step_x) {
+  for (const double x : ticks(horizontal, step_x)) {
     const int at = static_cast<int>(std::lround(column(x)));
     picture.fill(at, frame.y, 1, frame.height, kGrid);
     picture.fill(at, bottom, 1, kTickLength, kInk);
     const std::string text = tick_text(x, step_x);
     picture.text(at - text_width(text) / 2, bottom + kTickLength + 3, text, kInk);
   }
-  for (double y = std::ceil(vertical.low / step_y) * step_y; y <= vertical.high + 1e-9 * step_y; y += step_y) {
+  for (const double y : ticks(vertical, step_y)) {
     const int at = static_cast<int>(std::lround(row(y)));
     picture.fill(frame.x, at, frame.width, 1, kGrid);
     picture.fill(frame.x - kTickLength, at, kTickLength, 1, kInk);
@@ -124,10 +133,13 @@ void Plot::map(const std::function<Colour(double, double)>& colour_at) {
     }
 }
 
-void Plot::note(double x, int pixels_below_top, std::string_view text, Colour colour) {
+int Plot::note_column(double x, std::string_view text) const {
   const int right = frame_.x + frame_.width - text_width(text);
-  const int at = std::clamp(static_cast<int>(std::lround(column(x))) + 3, frame_.x, std::max(frame_.x, right));
-  picture_.text(at, frame_.y + pixels_below_top, text, colour);
+  return std::clamp(static_cast<int>(std::lround(column(x))) + 3, frame_.x, std::max(frame_.x, right));
+}
+
+void Plot::note(double x, int pixels_below_top, std::string_view text, Colour colour) {
+  picture_.text(note_column(x, text), frame_.y + pixels_below_top, text, colour);
 }
 
 Colour heat(double part) {

@@ -36,6 +36,8 @@ class Plot {
   // The colour of each pixel by its place on the axes.
   void map(const std::function<picture::Colour(double x, double y)>& colour_at);
   void note(double x, int pixels_below_top, std::string_view text, picture::Colour colour);
+  // The first column of pixels of such a note.
+  [[nodiscard]] int note_column(double x, std::string_view text) const;
 
  private:
   [[nodiscard]] double column(double x) const;

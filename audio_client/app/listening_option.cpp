@@ -9,7 +9,7 @@
 
 namespace osteon::audio {
 
-void add_listening(CLI::App& command, ListeningOption& listening) {
+void add_listening(CLI::App& command, ListeningOption& listening, const std::string& middle) {
   command
       .add_option("--listen", listening.listen,
                   "loudspeakers: from near the tool, by level; headphones: from the surgeon's head, by HRTF; mono")
@@ -19,8 +19,9 @@ void add_listening(CLI::App& command, ListeningOption& listening) {
   command
       .add_option(
           "--listener", listening.listener_mm,
-          "X Y Z of the listener, mm from the middle of the bone along the axes of its scan. The listener looks "
-          "at the middle. By default, at the right side of a patient who lies on the back")
+          "X Y Z of the listener, mm from the middle of " + middle +
+              " along the axes of its scan. The listener looks at the middle. By default, at the right side of a "
+              "patient who lies on the back")
       ->expected(3)
       ->check(number_in(-kFarthest_mm, kFarthest_mm));
   command
@@ -34,6 +35,9 @@ Result<Space> read(const ListeningOption& option, double rate_hz) {
   if (!way) return tl::unexpected(way.error());
   if (!option.hrtf.empty() && *way != Listening::headphones)
     return failure(ErrorCode::invalid_input, "--hrtf is of headphones only; add --listen headphones");
+  Space space;
+  space.listening = *way;
+  if (*way == Listening::mono) return space;  // from nowhere
   const auto vector = [](const std::vector<double>& given, const Vec3& usual) {
     return given.size() == 3 ? Vec3(given[0], given[1], given[2]) : usual;
   };
@@ -43,8 +47,6 @@ Result<Space> read(const ListeningOption& option, double rate_hz) {
   const Vec3 up = vector(option.up, -Vec3::UnitY());
   if (up.norm() < 1e-6)
     return failure(ErrorCode::invalid_input, "--listener-up 0 0 0 is no direction; give one, such as 0 -1 0");
-  Space space;
-  space.listening = *way;
   space.pose_bone_head = looking(from_mm, Vec3::Zero(), up);
   if (*way != Listening::headphones) return space;
   Result<Hrtf> hrtf = read_hrtf(option.hrtf, rate_hz);
@@ -53,6 +55,6 @@ Result<Space> read(const ListeningOption& option, double rate_hz) {
   return space;
 }
 
-void move_to_bone(Space& space, const Vec3& centre_mm) { space.pose_bone_head.position_mm += centre_mm; }
+void move_to_middle(Space& space, const Vec3& middle_mm) { space.pose_bone_head.position_mm += middle_mm; }
 
 }  // namespace osteon::audio

@@ -17,12 +17,12 @@ struct ListeningOption {
   std::vector<double> listener_mm, up;  // empty: the usual ones
 };
 
-// Adds --listen, --hrtf, --listener and --listener-up. `listening` outlives `command`.
-void add_listening(CLI::App& command, ListeningOption& listening);
+// Adds --listen, --hrtf, --listener and --listener-up. `middle`: what the listener looks at ("the bone"). `listening`
+// outlives `command`.
+void add_listening(CLI::App& command, ListeningOption& listening, const std::string& middle);
 
-// The listener, with the middle of the bone at the origin; move_to_bone() moves it. Errors: invalid_input, not_found
-// (--hrtf).
+// The listener, with that middle at the origin; move_to_middle() moves it. Errors: invalid_input, not_found (--hrtf).
 [[nodiscard]] Result<Space> read(const ListeningOption& option, double rate_hz);
-void move_to_bone(Space& space, const Vec3& centre_mm);
+void move_to_middle(Space& space, const Vec3& middle_mm);
 
 }  // namespace osteon::audio

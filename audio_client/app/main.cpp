@@ -212,31 +212,47 @@ Result<void> check_outputs(const Options& options) {
   return {};
 }
 
-Result<void> run(const Options& options, const StopSignal& stop) {
-  const Result<wire::ClientCredentials> credentials = wire::client_credentials(options.credentials);
+// What is read before anything is opened or written.
+struct Prepared {
+  wire::ClientCredentials credentials;
+  audio::OutputParams output;
+  audio::SynthParams synth;
+  audio::Space space;  // the middle of the bone is not known yet
+};
+
+// Errors on this machine are found before the server is contacted.
+Result<Prepared> prepare(const Options& options) {
+  Prepared prepared;
+  Result<wire::ClientCredentials> credentials = wire::client_credentials(options.credentials);
   if (!credentials) return tl::unexpected(credentials.error());
+  prepared.credentials = std::move(*credentials);
   const Result<audio::OutputKind> kind = audio::output_kind(options.output);
   if (!kind) return tl::unexpected(kind.error());
-  audio::OutputParams output_params;
-  output_params.kind = *kind;
-  output_params.device = options.device;
+  prepared.output.kind = *kind;
+  prepared.output.device = options.device;
   if (!options.device.empty() && *kind != audio::OutputKind::pulse)
     return failure(ErrorCode::invalid_input, "--device is a sink of PulseAudio; use --output pulse with it");
 
-  // Errors on this machine are found before the server is contacted.
   if (Result<void> usable = check_writable(options.state_log_file, "the state log", "--state-log"); !usable)
-    return usable;
-  if (Result<void> usable = check_writable(options.wav_file, "the recording", "--wav"); !usable) return usable;
-  if (Result<void> apart = check_outputs(options); !apart) return apart;
+    return tl::unexpected(usable.error());
+  if (Result<void> usable = check_writable(options.wav_file, "the recording", "--wav"); !usable)
+    return tl::unexpected(usable.error());
+  if (Result<void> apart = check_outputs(options); !apart) return tl::unexpected(apart.error());
   Result<std::vector<audio::ToolModel>> presets = audio::presets_of(options.presets);
   if (!presets) return tl::unexpected(presets.error());
-  std::optional<audio::WavRecorder> recorder;
-  audio::SynthParams synth_params;
-  synth_params.rate_hz = output_params.rate_hz;
-  synth_params.presets = std::move(*presets);
-  Result<audio::Space> space = audio::read(options.listening, output_params.rate_hz);
+  prepared.synth.rate_hz = prepared.output.rate_hz;
+  prepared.synth.presets = std::move(*presets);
+  Result<audio::Space> space = audio::read(options.listening, prepared.output.rate_hz);
   if (!space) return tl::unexpected(space.error());
-  audio::SoundEngine engine(synth_params);
+  prepared.space = std::move(*space);
+  return prepared;
+}
+
+Result<void> run(const Options& options, Prepared prepared, const StopSignal& stop) {
+  const audio::OutputParams& output_params = prepared.output;
+  audio::Space& space = prepared.space;
+  std::optional<audio::WavRecorder> recorder;
+  audio::SoundEngine engine(prepared.synth);
   Result<Window> window = Window::connect(options);
   if (!window) return tl::unexpected(window.error());
   if (window->there()) engine.set_volume(0.0);  // until the window has said how loud
@@ -247,7 +263,7 @@ Result<void> run(const Options& options, const StopSignal& stop) {
   Result<wire::JoinedRoom> room = wire::join_room(
       options.server, wire::ClientKind::audio, options.name,
       std::chrono::milliseconds(static_cast<std::int64_t>(1000 * options.patience_s)), [&] { return stop.requested(); },
-      options.room, *credentials);
+      options.room, prepared.credentials);
   // A stop was requested, perhaps before the server answered.
   if (!room && room.error().code == ErrorCode::cancelled) return {};
   if (!room) return tl::unexpected(room.error());
@@ -257,13 +273,13 @@ Result<void> run(const Options& options, const StopSignal& stop) {
   if (Result<void> opened = states.open(options.state_log_file); !opened) return opened;
   if (!options.wav_file.empty()) {
     Result<audio::WavRecorder> opened = audio::WavRecorder::open(options.wav_file, output_params.rate_hz,
-                                                                 space->listening == audio::Listening::mono ? 1 : 2);
+                                                                 space.listening == audio::Listening::mono ? 1 : 2);
     if (!opened) return tl::unexpected(opened.error());
     recorder = std::move(*opened);
     engine.record_to(*recorder);
   }
-  audio::move_to_bone(*space, room->bounds.centre_mm());
-  engine.listen(*space);
+  audio::move_to_middle(space, room->bounds.centre_mm());
+  engine.listen(space);
   if (output.opened())
     if (Result<void> started = output.start(); !started && !window->there()) return started;
   log::info("joined", {{"server", options.server}, {"case", room->case_title}, {"output", options.output}});
@@ -345,7 +361,7 @@ int main(int argc, char** argv) {
       ->capture_default_str();
   app.add_option("--device", options.device,
                  "Name or number of a sink, as osteon-audio devices lists them; by default, the server's own choice");
-  audio::add_listening(app, options.listening);
+  audio::add_listening(app, options.listening, "the bone");
   app.add_option("--preset", options.presets,
                  "Preset of a tool's sound, or a folder of presets, which go before those of Osteon; may be repeated")
       ->allow_extra_args(false);
@@ -373,7 +389,10 @@ int main(int argc, char** argv) {
     return log::exit_with(kProgram, {ErrorCode::invalid_input, "--server is required; see osteon-audio --help"});
 
   log::open(kProgram);
-  const StopSignal stop;
-  const Result<void> outcome = run(options, stop);
+  // A large head takes seconds. Until it is there, Ctrl+C ends the program at once.
+  Result<Prepared> prepared = prepare(options);
+  if (!prepared) return log::exit_with(kProgram, prepared.error());
+  const StopSignal stop(StopSignal::HangUp::stops);
+  const Result<void> outcome = run(options, std::move(*prepared), stop);
   return outcome ? 0 : log::exit_with(kProgram, outcome.error());
 }

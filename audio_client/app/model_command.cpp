@@ -76,6 +76,7 @@ void add_model_commands(CLI::App& app, std::function<Result<std::string>()>& cho
       ->check(CLI::Range(0, 20))
       ->capture_default_str();
   command->add_option("--seed", model->seed, "Of the phases and the noise: the same gives the same sound")
+      ->check(whole_number())
       ->capture_default_str();
   command->callback([model, &chosen] { chosen = [model] { return run_model(*model); }; });
 
@@ -84,6 +85,7 @@ void add_model_commands(CLI::App& app, std::function<Result<std::string>()>& cho
   command->add_option("MODEL", again->model, "File of a model")->required();
   command->add_option("OUT", again->out, "WAV file for its sound, 16 bit, mono")->required();
   command->add_option("--seed", again->seed, "Of the phases and the noise: the same gives the same sound")
+      ->check(whole_number())
       ->capture_default_str();
   command->callback([again, &chosen] { chosen = [again] { return run_resynthesis(*again); }; });
 }

@@ -109,7 +109,7 @@ Result<std::string> run_record(RecordArguments a) {
   if (!a.overwrite && std::filesystem::exists(a.out, ignored))
     return failure(ErrorCode::exists, a.out + " is already there; give another name, or --overwrite");
   if (auto usable = check_output(a.out, "the recording", "OUT", {}); !usable) return tl::unexpected(usable.error());
-  const StopSignal stop;  // before the server's threads begin
+  const StopSignal stop(StopSignal::HangUp::stops);  // before the server's threads begin
   a.input.rate_hz = static_cast<unsigned>(a.rate_hz);
   a.input.channels = static_cast<unsigned>(a.channels);
   auto input = SoundInput::open(a.input);
@@ -131,7 +131,13 @@ Result<std::string> run_record(RecordArguments a) {
   if (writer->frames() == 0)
     return outcome ? failure(ErrorCode::cancelled, "stopped before a sound came; " + a.out + " was not written")
                    : tl::unexpected(outcome.error());
-  // What was recorded cannot be recorded again: it is kept whatever ended it.
+  // What was recorded cannot be recorded again: it is kept whatever ended it, and so is an older file.
+  if (!outcome && std::filesystem::exists(a.out, ignored)) {
+    const auto kept = writer->close_apart();
+    if (!kept) return tl::unexpected(kept.error());
+    return failure(outcome.error().code, outcome.error().message + "; " + kept->string() +
+                                             " has what came until then, and " + a.out + " is as it was");
+  }
   if (auto closed = writer->close(); !closed) return tl::unexpected(closed.error());
   if (!outcome)
     return failure(outcome.error().code, outcome.error().message + "; " + a.out + " has what came until then");

@@ -1,9 +1,11 @@
 #include "audio_client/app/recording_option.hpp"
 
 #include <cmath>
+#include <cstdint>
 #include <cstdlib>
 
 #include "common/core/bounded_text.hpp"
+#include "common/core/read_number.hpp"
 
 namespace osteon::audio {
 
@@ -14,6 +16,13 @@ CLI::Validator number_in(double least, double most) {
       },
       "");
   return finite & CLI::Range(least, most);
+}
+
+CLI::Validator whole_number() {
+  return {[](const std::string& text) {
+            return read_number<std::uint64_t>(text) ? std::string() : text + " is no whole number from 0 to 2^64 - 1";
+          },
+          ""};
 }
 
 void add_recording(CLI::App& command, RecordingOption& recording) {

@@ -13,8 +13,10 @@
 #include <utility>
 #include <vector>
 
+#include "audio_client/app/listening_option.hpp"
 #include "audio_client/app/output_file.hpp"
 #include "audio_client/app/preset_command.hpp"
+#include "audio_client/app/recording_option.hpp"
 #include "audio_client/offline/offline_sound.hpp"
 #include "audio_client/offline/state_record.hpp"
 #include "common/runtime/progress.hpp"
@@ -25,56 +27,113 @@
 namespace osteon::audio {
 namespace {
 
+constexpr int kMostOfHeadphones_hz = 48000;
+
 struct RenderArguments {
   std::string record, out;
   int rate_hz = 48000, bits = 16;
   std::uint64_t seed = 1;
+  ListeningOption listening;
   std::vector<std::string> presets;
 };
 
-std::string summary(const RenderArguments& a, const OfflineSound& sound, double work_s) {
+std::string summary(const RenderArguments& a, const OfflineSound& sound, const std::string& note, double work_s) {
   const double seconds = static_cast<double>(sound.frames) / a.rate_hz;
   const double peak_db = sound.peak > 0 ? 20.0 * std::log10(static_cast<double>(sound.peak)) : sound::kSilence_db;
   std::array<char, 256> text{};
   std::snprintf(text.data(), text.size(),
                 "states     %llu in %.3f s of sound, %d Hz, peak %.1f dB\n"
+                "listener   %s\n"
                 "made       in %.3f s, %.0f times as fast as it sounds\n",
-                static_cast<unsigned long long>(sound.states), seconds, a.rate_hz, peak_db, work_s, seconds / work_s);
-  return text.data() + ("written    " + a.out + "\n");
+                static_cast<unsigned long long>(sound.states), seconds, a.rate_hz, peak_db, a.listening.listen.c_str(),
+                work_s, seconds / work_s);
+  return text.data() + (note.empty() ? "" : "note       " + note + "\n") + "written    " + a.out + "\n";
 }
 
-Result<std::string> run_render(const RenderArguments& a) {
-  std::vector<OtherFile> read{{a.record}};
-  for (const std::string& preset : a.presets) read.push_back({preset});
-  if (auto usable = check_output(a.out, "the sound", "--out", read); !usable) return tl::unexpected(usable.error());
-  auto presets = presets_of(a.presets);
-  if (!presets) return tl::unexpected(presets.error());
-  auto record = open_states(a.record);
-  if (!record) return tl::unexpected(record.error());
-  auto writer = sound::WavWriter::open(a.out, {.rate_hz = a.rate_hz, .channels = 1, .bits = a.bits});
-  if (!writer) return tl::unexpected(writer.error());
+// A bar that appears with the first work, so that a refused record prints only its sentence.
+class Work {
+ public:
+  Work(const StopSignal& stop, const char* what) : stop_(stop), what_(what) {}
+  bool go_on(double done) {
+    if (done > 0 && !bar_) bar_.emplace(what_);
+    if (bar_) bar_->update(done);
+    return !stop_.requested();
+  }
 
-  const StopSignal stop;
-  std::optional<Progress> bar;  // appears with the first work, so that a refused record prints only its sentence
-  const auto keep_going = [&](double done) {
-    if (done > 0 && !bar) bar.emplace("making the sound");
-    if (bar) bar->update(done);
-    return !stop.requested();
-  };
+ private:
+  const StopSignal& stop_;
+  const char* what_;
+  std::optional<Progress> bar_;
+};
+
+// The record does not have the bone's bounds, of which the live listener looks at the middle.
+Result<void> look_at_work(Space& space, const std::string& record, const StopSignal& stop) {
+  if (space.listening == Listening::mono) return {};
+  auto states = open_states(record);
+  if (!states) return tl::unexpected(states.error());
+  Work work(stop, "reading the session");
+  const auto middle_mm = middle_of_work(**states, [&](double done) { return work.go_on(done); });
+  if (!middle_mm) return tl::unexpected(middle_mm.error());
+  move_to_middle(space, *middle_mm);
+  return {};
+}
+
+Result<SynthParams> synth_params(const RenderArguments& a) {
   SynthParams params;
   params.rate_hz = a.rate_hz;
   params.seed = a.seed;
+  auto presets = presets_of(a.presets);
+  if (!presets) return tl::unexpected(presets.error());
   params.presets = std::move(*presets);
+  // The ears' filters have a fixed number of taps, too few at higher rates.
+  if (a.listening.listen == "headphones" && a.rate_hz > kMostOfHeadphones_hz)
+    return bad_input("--rate of headphones is at most " + std::to_string(kMostOfHeadphones_hz) +
+                     "; give a lower one, or another --listen");
+  auto space = read(a.listening, params.rate_hz);
+  if (!space) return tl::unexpected(space.error());
+  params.space = std::move(*space);
+  return params;
+}
+
+// Writes one channel in mono, and two otherwise.
+Result<OfflineSound> write_sound(StateRecord& record, const SynthParams& params, sound::WavWriter& writer,
+                                 const StopSignal& stop) {
+  const bool mono = params.space.listening == Listening::mono;
+  std::vector<float> both;
+  const auto take = [&](std::span<const float> left, std::span<const float> right) -> Result<void> {
+    if (mono) return writer.write(left);
+    both.clear();
+    for (std::size_t i = 0; i < left.size(); ++i) both.insert(both.end(), {left[i], right[i]});
+    return writer.write(both);
+  };
+  Work work(stop, "making the sound");
+  return render_states(record, params, take, [&](double done) { return work.go_on(done); });
+}
+
+Result<std::string> run_render(const RenderArguments& a) {
+  std::vector<OtherFile> read_files{{a.record}, {a.listening.hrtf}};
+  for (const std::string& preset : a.presets) read_files.push_back({preset});
+  if (auto usable = check_output(a.out, "the sound", "--out", read_files); !usable)
+    return tl::unexpected(usable.error());
+  auto params = synth_params(a);
+  if (!params) return tl::unexpected(params.error());
+  auto record = open_states(a.record);
+  if (!record) return tl::unexpected(record.error());
+  auto writer = sound::WavWriter::open(
+      a.out, {.rate_hz = a.rate_hz, .channels = params->space.listening == Listening::mono ? 1 : 2, .bits = a.bits});
+  if (!writer) return tl::unexpected(writer.error());
+
+  const StopSignal stop(StopSignal::HangUp::stops);
   const auto begin = std::chrono::steady_clock::now();
-  const auto sound = render_states(
-      **record, params, [&](std::span<const float> frames) { return writer->write(frames); }, keep_going);
-  bar.reset();
+  const auto looked = look_at_work(params->space, a.record, stop);
+  const Result<OfflineSound> sound =
+      looked ? write_sound(**record, *params, *writer, stop) : Result<OfflineSound>(tl::unexpected(looked.error()));
   if (!sound && sound.error().code == ErrorCode::cancelled)
     return failure(ErrorCode::cancelled, "stopped; " + a.out + " was not written");
   if (!sound) return tl::unexpected(sound.error());
   if (auto closed = writer->close(); !closed) return tl::unexpected(closed.error());
   const std::chrono::duration<double> work = std::chrono::steady_clock::now() - begin;
-  return summary(a, *sound, work.count());
+  return summary(a, *sound, (*record)->unknown_tool(), work.count());
 }
 
 }  // namespace
@@ -86,12 +145,15 @@ void add_render_command(CLI::App& app, std::function<Result<std::string>()>& cho
       app.add_subcommand("render", "Make the sound of a recorded session, without a server and faster than it sounds");
   command->add_option("RECORD", a.record, "What osteon-haptic --record (session.h5) or --session-log (CSV) wrote")
       ->required();
-  command->add_option("--out", a.out, "WAV file for the sound, PCM, mono")->required();
+  command->add_option("--out", a.out, "WAV file for the sound, PCM: both channels, or one with --listen mono")
+      ->required();
+  add_listening(*command, a.listening, "the work in bone");
   command->add_option("--rate", a.rate_hz, "Samples in a second; the live sound has 48000")
       ->check(CLI::Range(22050, 192000))
       ->capture_default_str();
   command->add_option("--bits", a.bits, "Of a sample: 16 or 24")->check(CLI::IsMember({16, 24}))->capture_default_str();
   command->add_option("--seed", a.seed, "Of the noise: the same gives the same sound; the live one has 1")
+      ->check(whole_number())
       ->capture_default_str();
   command
       ->add_option("--preset", a.presets,

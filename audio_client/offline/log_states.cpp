@@ -89,7 +89,7 @@ class LogStates final : public StateRecord {
     std::size_t at = kNoColumn;
   };
   enum Needed { kMonoNs, kPhase, kTool, kRpm, kFeed, kDensity, kForce, kTorque };
-  enum Optional { kSeq, kAuthor, kSuction, kTipX, kTipY, kTipZ, kCortex, kSeated, kBlows, kImpulse };
+  enum Optional { kSeq, kAuthor, kSuction, kTipX, kTipY, kTipZ, kCortex, kSeated, kBlows, kImpulse, kEngaged };
 
   [[nodiscard]] std::size_t find(std::string_view name) const {
     const auto found = std::ranges::find(columns_, name);
@@ -138,6 +138,7 @@ class LogStates final : public StateRecord {
     state.tool_name = bounded_text(fields_[needed_[kTool].at], 200);
     state.state_seq = rows_;
     state.author.value = 1;
+    state.engaged_fraction = 1;
     double force_n = 0;
     int suction = 0;
     Vec3& tip = state.pose_bone_tool.position_mm;
@@ -149,7 +150,7 @@ class LogStates final : public StateRecord {
           number(optional_[kSuction], suction), number(optional_[kTipX], tip.x()), number(optional_[kTipY], tip.y()),
           number(optional_[kTipZ], tip.z()), number(optional_[kCortex], state.cortex_mm),
           number(optional_[kSeated], state.seated), number(optional_[kBlows], state.blows),
-          number(optional_[kImpulse], state.blow_impulse_N_s)})
+          number(optional_[kImpulse], state.blow_impulse_N_s), number(optional_[kEngaged], state.engaged_fraction)})
       if (wrong) return no_value(*wrong, "no number");
     // The log has the size of the force and not its direction, and the sound needs no more.
     state.force_physical_N = {0, 0, force_n};
@@ -174,7 +175,7 @@ class LogStates final : public StateRecord {
                                     {"force_physical_n"},
                                     {"torque_nmm"}}};
   // Logs of other versions may lack these.
-  std::array<Column, 10> optional_ = {{{"state_seq"},
+  std::array<Column, 11> optional_ = {{{"state_seq"},
                                        {"author"},
                                        {"suction"},
                                        {"tip_x_mm"},
@@ -183,7 +184,8 @@ class LogStates final : public StateRecord {
                                        {"cortex_mm"},
                                        {"seated"},
                                        {"blows"},
-                                       {"blow_impulse_n_s"}}};
+                                       {"blow_impulse_n_s"},
+                                       {"engaged"}}};
 };
 
 }  // namespace

@@ -15,6 +15,7 @@ constexpr std::int64_t kSecond_ns = 1'000'000'000;
 // As the live client has it: tools whose state was not received for so long run down, which takes at most as long.
 constexpr std::int64_t kStale_ns = 2 * kSecond_ns;
 constexpr int kBuffersPerReport = 64;
+constexpr std::uint64_t kStatesPerReport = 8192;
 
 // What the live client's reader and engine do, with the record's time instead of a clock.
 class Player {
@@ -33,7 +34,7 @@ class Player {
   }
 
   // False when the last tool has fallen silent.
-  Result<bool> fill(std::span<float> buffer, OfflineSound& sound) {
+  Result<bool> fill(std::span<float> left, std::span<float> right, OfflineSound& sound) {
     const std::int64_t now_ns = start_ns_ + std::llround(1e9 * static_cast<double>(sound.frames) / rate_hz_);
     auto fresh = take_until(now_ns, sound);
     if (!fresh) return tl::unexpected(fresh.error());
@@ -44,9 +45,10 @@ class Player {
       sounding_ = false;
     }
     if (!next_ && !*fresh && (synth_.silent() || now_ns - newest_ns_ > kStale_ns)) return false;
-    synth_.process(buffer);
-    sound.frames += buffer.size();
-    for (const float x : buffer) sound.peak = std::max(sound.peak, std::abs(x));
+    synth_.process(left, right);
+    sound.frames += left.size();
+    for (const std::span<const float> side : {std::span<const float>(left), std::span<const float>(right)})
+      for (const float x : side) sound.peak = std::max(sound.peak, std::abs(x));
     return true;
   }
 
@@ -82,14 +84,32 @@ Result<OfflineSound> render_states(StateRecord& record, const SynthParams& param
   OfflineSound sound;
   Player player(record, params);
   if (auto begun = player.begin(); !begun) return tl::unexpected(begun.error());
-  std::vector<float> buffer(OutputParams{}.frames);
+  std::vector<float> left(OutputParams{}.frames), right(left.size());
   for (int count = 0;; ++count) {
     if (count % kBuffersPerReport == 0 && !keep_going(record.done())) return stopped_while("making the sound");
-    const auto more = player.fill(buffer, sound);
+    const auto more = player.fill(left, right, sound);
     if (!more) return tl::unexpected(more.error());
     if (!*more) return sound;
-    if (auto taken = take(buffer); !taken) return tl::unexpected(taken.error());
+    if (auto taken = take(left, right); !taken) return tl::unexpected(taken.error());
   }
+}
+
+Result<Vec3> middle_of_work(StateRecord& record, const KeepGoing& keep_going) {
+  Vec3 all_mm = Vec3::Zero(), touching_mm = Vec3::Zero();
+  std::uint64_t count = 0, touching = 0;
+  for (;; ++count) {
+    if (count % kStatesPerReport == 0 && !keep_going(record.done())) return stopped_while("reading the session");
+    const auto state = record.next();
+    if (!state) return tl::unexpected(state.error());
+    if (!*state) break;
+    const Vec3& tip_mm = (*state)->pose_bone_tool.position_mm;
+    all_mm += tip_mm;
+    if ((*state)->phase != CuttingPhase::cutting && (*state)->phase != CuttingPhase::rubbing) continue;
+    touching_mm += tip_mm;
+    ++touching;
+  }
+  if (count == 0) return bad_input(record.name() + " holds no state; record a session");
+  return Vec3(touching > 0 ? touching_mm / static_cast<double>(touching) : all_mm / static_cast<double>(count));
 }
 
 }  // namespace osteon::audio

@@ -16,13 +16,17 @@ struct OfflineSound {
   float peak = 0;
 };
 
-// Takes the next frames, in order.
-using TakeFrames = std::function<Result<void>(std::span<const float> frames)>;
+// Takes the next frames of both channels, in order. In mono both are equal.
+using TakeFrames = std::function<Result<void>(std::span<const float> left, std::span<const float> right)>;
 
 // The sound begins with the first state. Every buffer of the live client's size takes the states that are there when
 // the buffer begins, and continues them to then. Where no state comes for 2 s, and at the end, the tool runs down as it
 // does live. Errors: those of the record and of `take`, and cancelled.
 [[nodiscard]] Result<OfflineSound> render_states(StateRecord& record, const SynthParams& params, const TakeFrames& take,
                                                  const KeepGoing& keep_going);
+
+// Where the work was, for a listener who looks there: the mean place of the tip while it touched bone. If it never did,
+// of all states. Reads the whole record, which then has no further state. Errors: those of the record, and cancelled.
+[[nodiscard]] Result<Vec3> middle_of_work(StateRecord& record, const KeepGoing& keep_going);
 
 }  // namespace osteon::audio

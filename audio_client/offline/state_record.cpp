@@ -6,6 +6,8 @@
 #include <string_view>
 
 #include "audio_client/offline/state_sources.hpp"
+#include "common/core/bounded_text.hpp"
+#include "common/tools/tool.hpp"
 
 namespace osteon::audio {
 namespace {
@@ -22,12 +24,13 @@ struct NamedNumber {
 
 // The first number that no session has, or nothing.
 std::optional<NamedNumber> impossible(const CuttingState& state) {
-  const std::array<NamedNumber, 9> numbers = {
+  const std::array<NamedNumber, 10> numbers = {
       {{"rpm", state.spindle_rpm, 0.0, kMostRecordedRpm},
        {"force", state.force_physical_N.norm(), 0.0, kMostNumber},
        {"torque", state.torque_Nmm, -kMostNumber, kMostNumber},
        {"feed", state.feed_mm_per_s, -kMostNumber, kMostNumber},
        {"density", state.density_g_cm3, 0.0, 100.0},
+       {"engaged share", state.engaged_fraction, 0.0, 1.0},
        {"position of the tip", state.pose_bone_tool.position_mm.norm(), 0.0, kMostNumber},
        {"cortex", state.cortex_mm, 0.0, kMostNumber},
        {"seated", state.seated, 0.0, 1.0},
@@ -38,6 +41,16 @@ std::optional<NamedNumber> impossible(const CuttingState& state) {
 }
 
 }  // namespace
+
+void StateRecord::note_tool(const std::string& name) {
+  if (name == last_tool_ || !unknown_tool_.empty()) return;
+  last_tool_ = name;
+  if (name.empty() || find_tool(name)) return;
+  std::string known;
+  for (const Tool& tool : builtin_tools()) known += (known.empty() ? "" : ", ") + tool.name;
+  unknown_tool_ = place("tool") + "is \"" + bounded_text(name, 60) +
+                  "\", which this program does not know, so it sounds like a drill; known are " + known;
+}
 
 Result<std::optional<CuttingState>> StateRecord::next() {
   auto state = read();
@@ -55,6 +68,7 @@ Result<std::optional<CuttingState>> StateRecord::next() {
   if (static_cast<double>(time_ns) - static_cast<double>(*first_ns_) > 1e9 * kLongestSession_s)
     return bad_input(place("mono_ns") + "is more than 4 hours after the first; give a record of one session");
   last_ns_ = time_ns;
+  note_tool((*state)->tool_name);
   return state;
 }
 

@@ -19,6 +19,9 @@ class StateRecord {
   // The next state, with its time_ns, in the order of time. Nothing at the end. Error invalid_input: names file, row,
   // field and remedy.
   [[nodiscard]] Result<std::optional<CuttingState>> next();
+  // One sentence on the first state whose tool this build does not know: it names file, row, field and the known names.
+  // Such a tool sounds like a drill. Empty if there is none so far.
+  [[nodiscard]] const std::string& unknown_tool() const { return unknown_tool_; }
   [[nodiscard]] virtual double done() const = 0;  // share that was read, 0 to 1
   [[nodiscard]] virtual std::string name() const = 0;
 
@@ -29,7 +32,10 @@ class StateRecord {
   [[nodiscard]] virtual std::string place(const char* field) const = 0;
 
  private:
+  void note_tool(const std::string& name);
+
   std::optional<std::int64_t> first_ns_, last_ns_;
+  std::string last_tool_, unknown_tool_;
 };
 
 inline constexpr double kLongestSession_s = 4 * 3600.0;

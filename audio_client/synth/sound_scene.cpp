@@ -46,7 +46,7 @@ ToolSound tool_sound(const CuttingState& state) {
   sound.seated = within(state.seated, 1.0);
   sound.blows = state.blows;
   sound.blow_impulse_N_s = within(state.blow_impulse_N_s, kMaxImpulse_N_s);
-  sound.tip_mm = state.pose_bone_tool.position_mm;
+  sound.tip_mm = sound.stated_tip_mm = state.pose_bone_tool.position_mm;
   sound.depth_mm = state.depth_mm;
   sound.phase = state.phase;
   sound.time_ns = state.time_ns;
@@ -59,6 +59,7 @@ ToolSound tool_sound(const CuttingState& state) {
   sound.torque_Nmm = within(std::abs(state.torque_Nmm), kMaxTorque_Nmm);
   sound.feed_mm_per_s = within(state.feed_mm_per_s, kMaxFeed_mm_per_s);
   sound.density_g_cm3 = within(state.density_g_cm3, kMaxDensity_g_cm3);
+  sound.bone_g_cm3 = sound.density_g_cm3 * within(state.engaged_fraction, 1.0);
   sound.load = within(0.5 * state.force_physical_N.norm() / scale.thrust_N + 0.5 * power_W / scale.power_W, kMaxLoad);
   sound.hardness = within(state.density_g_cm3 / kCorticalDensity_g_cm3, kMaxHardness);
   sound.advancing = state.feed_mm_per_s > 0;

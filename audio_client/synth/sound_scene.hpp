@@ -32,6 +32,10 @@ struct ToolSound {
   double blow_impulse_N_s = 0;
   Vec3 tip_mm = Vec3::Zero();  // of the tool, bone frame
   double depth_mm = 0;         // of the tip from its entry
+  // Two as the newest state has them, and not computed ahead: the tip, and the density under the cutting part times the
+  // share of it that is in bone.
+  Vec3 stated_tip_mm = Vec3::Zero();
+  double bone_g_cm3 = 0;
   CuttingPhase phase = CuttingPhase::idle;
   std::int64_t time_ns = 0;  // of the state, by the clock of the tool's haptic client; 0: unknown
 };

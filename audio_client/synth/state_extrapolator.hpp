@@ -38,8 +38,8 @@ class StateExtrapolator {
 
   // [audio] The tools at a time of our steady clock. Tip and depth go on with their velocity. Force, load and the like
   // go on as from the state before to the newest, unless the tool's phase has changed or a blow has come. None goes
-  // beyond its limits. Places go on for two periods of the states at most, the rest for one. Phase, blows, seating and
-  // thickness are as they came. A state of unknown time stays as it came.
+  // beyond its limits. Places go on for two periods of the states at most, the rest for one. Phase, blows, seating,
+  // thickness and what a breakthrough is known by are as they came. A state of unknown time stays as it came.
   [[nodiscard]] const SoundScene& at(std::int64_t now_ns) noexcept;
   // Whether the tools of at() change with time. If not, they are as they were taken.
   [[nodiscard]] bool moves() const noexcept;

@@ -19,12 +19,19 @@ constexpr double kTurn = 2.0 * std::numbers::pi;
 constexpr double kFadeStart = 0.375, kFadeEnd = 0.4375;
 
 constexpr double kSilentRpm = 1.0;
-constexpr double kRecentLoad_s = 0.15;
+constexpr double kRecent_s = 0.15;
 constexpr double kFlutter_s = 0.08;
 
 // A layer gives way if less than this share of a load is left. Cancellous bone behind a cortex keeps more.
 constexpr double kGivesWay = 0.3;
 constexpr double kKnockLoad = 0.25;  // a smaller load gives way without a sound
+// Then less than this share of the bone under the cutting part is left. [A]
+constexpr double kThrough = 0.05;
+// And the tip goes on by so much, so soon after it was in bone. A tool that feeds by less than 20 mm/s does not come so
+// far from one state to the next, 60 times a second. A hand that falls through goes 45 mm/s and more. [A]
+constexpr double kFallsOn_mm = 0.35, kFallsSoon_s = 0.1;
+constexpr double kWayKeeps = 0.8;  // of the way in bone, from one step to the next
+constexpr double kLeastStep_mm = 1e-6, kMostStep_mm = 100.0;
 
 // Each tooth breaks its own chips. Below this frequency that is a rattle; above, a tone that the partials make.
 constexpr double kRattle_hz = 400.0;
@@ -126,18 +133,37 @@ void Voice::release() noexcept {
   waits_ = false;
 }
 
-// A layer gives way: the load is gone from a tool that advances, or that advanced one state ago and is through. A tool
-// that is drawn back stops first and leaves without a knock. Only what a state has said counts: a load that falls, and
-// that is computed ahead, may stay after all.
+// A layer gives way: bone and load are gone from a tool that goes on. A hand that eases off leaves the bone under the
+// tool. A haptic loop that stalls, and a session that ends, say neither bone nor load, but the tip stays. A tool that
+// is drawn back goes the other way. Only what a state has said counts: what is computed ahead may stay after all.
 void Voice::break_through(const ToolSound& tool) noexcept {
+  if (tool.bone_g_cm3 >= kThrough * recent_bone_g_cm3_) return follow_in_bone(tool);
   const double load = tool.load - tool.load_ahead;
-  if (!(tool.advancing || target_.advancing) || recent_load_ <= kKnockLoad || load >= kGivesWay * recent_load_) return;
+  if (recent_load_ <= kKnockLoad || load >= kGivesWay * recent_load_) return;
+  if (!tool.advancing && !fell_on(tool)) return;
   const double released = recent_load_ - load;
   const std::vector<Mode>& burst = handpiece_->model.perforation.burst;
   for (std::size_t m = 0; m < burst.size(); ++m)
     burst_.strike(m, burst[m].hz, burst[m].decay_s, released * amplitude_of_db(burst[m].level_db), rate_hz_);
   perforated_ = std::clamp(released, perforated_, 1.0);
   recent_load_ = load;
+  recent_bone_g_cm3_ = tool.bone_g_cm3;
+}
+
+void Voice::follow_in_bone(const ToolSound& tool) noexcept {
+  if (tool.bone_g_cm3 <= 0) return;
+  if (since_bone_s_ > kFallsSoon_s) way_mm_ = Vec3::Zero();  // it may have come from anywhere
+  const Vec3 step_mm = tool.stated_tip_mm - bone_tip_mm_;
+  const bool moves = step_mm.norm() > kLeastStep_mm && step_mm.norm() < kMostStep_mm;  // not true of nan
+  if (moves && since_bone_s_ <= kFallsSoon_s) way_mm_ = kWayKeeps * way_mm_ + step_mm;
+  bone_tip_mm_ = tool.stated_tip_mm;
+  since_bone_s_ = 0;
+}
+
+bool Voice::fell_on(const ToolSound& tool) const noexcept {
+  const double way_mm = way_mm_.norm();
+  return since_bone_s_ <= kFallsSoon_s && way_mm > kLeastStep_mm &&
+         (tool.stated_tip_mm - bone_tip_mm_).dot(way_mm_) >= kFallsOn_mm * way_mm;
 }
 
 void Voice::blow(const ToolSound& tool) noexcept {
@@ -179,7 +205,10 @@ void Voice::advance_controls() noexcept {
   chips_ += k * (target_.chips - chips_);
   if (target_.cortex_mm > 0)
     cortex_mm_ = cortex_mm_ > 0 ? cortex_mm_ + k * (target_.cortex_mm - cortex_mm_) : target_.cortex_mm;
-  recent_load_ = std::max(target_.load - target_.load_ahead, recent_load_ * (1.0 - share(kRecentLoad_s, rate_hz_)));
+  const double keeps = 1.0 - share(kRecent_s, rate_hz_);
+  recent_load_ = std::max(target_.load - target_.load_ahead, keeps * recent_load_);
+  recent_bone_g_cm3_ = std::max(target_.bone_g_cm3, keeps * recent_bone_g_cm3_);
+  since_bone_s_ += kBlockFrames / rate_hz_;
   perforated_ *= 1.0 - share(handpiece_->model.perforation.fade_s, rate_hz_);
   gains_ = material_gains(handpiece_->model, load_, hardness_, perforated_);
 }

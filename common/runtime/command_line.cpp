@@ -3,6 +3,7 @@
 #include <CLI/CLI.hpp>
 
 #include <algorithm>
+#include <csignal>
 #include <memory>
 
 #include "common/runtime/log.hpp"
@@ -75,6 +76,8 @@ std::string wrapped(std::string_view text, std::size_t columns, std::size_t inde
 std::optional<int> parse_arguments(CLI::App& app, int argc, const char* const* argv) {
   app.set_version_flag("--version", app.get_name() + " " OSTEON_VERSION, "Print the version and exit");
   use_help(app, std::make_shared<Help>());
+  // Beyond a limit of the shell, a write then fails like one to a full disk, and the program says so.
+  std::signal(SIGXFSZ, SIG_IGN);
   try {
     app.parse(argc, argv);
     return std::nullopt;

@@ -44,7 +44,7 @@ bool wait_for_requests(int wanted, std::chrono::milliseconds time) {
 
 }  // namespace
 
-StopSignal::StopSignal() {
+StopSignal::StopSignal(HangUp hang_up) {
   OSTEON_CHECK(wake_descriptor.load() < 0);
   stop_requests = 0;
   wake_descriptor = ::eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC);
@@ -52,12 +52,17 @@ StopSignal::StopSignal() {
   action.sa_handler = on_signal;
   ::sigaction(SIGINT, &action, nullptr);
   ::sigaction(SIGTERM, &action, nullptr);
+  struct sigaction before {};
+  if (hang_up == HangUp::stops && ::sigaction(SIGHUP, nullptr, &before) == 0 && before.sa_handler != SIG_IGN)
+    ::sigaction(SIGHUP, &action, nullptr);
   ::signal(SIGPIPE, SIG_IGN);
 }
 
 StopSignal::~StopSignal() {
   ::signal(SIGINT, SIG_DFL);
   ::signal(SIGTERM, SIG_DFL);
+  struct sigaction now {};
+  if (::sigaction(SIGHUP, nullptr, &now) == 0 && now.sa_handler == on_signal) ::signal(SIGHUP, SIG_DFL);
   ::close(wake_descriptor.exchange(-1));
 }
 

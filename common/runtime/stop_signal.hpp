@@ -1,4 +1,4 @@
-// SIGINT and SIGTERM as a flag. Any thread may read it, and one thread may wait for it.
+// SIGINT and SIGTERM as a flag, and SIGHUP if asked. Any thread may read it, and one thread may wait for it.
 #pragma once
 #include <chrono>
 
@@ -8,7 +8,10 @@ namespace osteon {
 // impatient person must not leave half-written files. It may shorten a wait. SIGQUIT still ends a process that hangs.
 class StopSignal {
  public:
-  StopSignal();
+  // What the end of the terminal does (SIGHUP). A program that was started by nohup goes on in either case.
+  enum class HangUp : bool { ends, stops };
+
+  explicit StopSignal(HangUp hang_up = HangUp::ends);
   ~StopSignal();
   StopSignal(const StopSignal&) = delete;
   StopSignal& operator=(const StopSignal&) = delete;

@@ -165,7 +165,8 @@ void find_bone(std::vector<Part>& parts, const StateParams& params, std::optiona
 }
 
 // A short burst at low frequencies after bone, before a free or resting drill. It may be several parts. Shorter parts
-// beside it are transitions, whose frames are half in the burst.
+// beside it are transitions, whose frames are half in the burst. While a burst rings off, it passes the level of softer
+// bone: quieter parts behind it, within its longest time, are still the burst.
 void find_perforation(std::vector<Part>& parts, const StateParams& params) {
   const auto is_transition = [&](std::size_t i) { return parts[i].seconds < kShortestSpan_s; };
   for (std::size_t i = 1; i < parts.size(); ++i) {
@@ -177,10 +178,15 @@ void find_perforation(std::vector<Part>& parts, const StateParams& params) {
     std::size_t end = i;
     while (end < parts.size() && parts[end].low_db >= burst_db && !parts[end].rests()) seconds += parts[end++].seconds;
     if (end == i || seconds > params.longest_burst_s) continue;
+    const auto rings_off = [&](std::size_t k) {
+      return parts[k].cuts() && parts[k].level_db < parts[k - 1].level_db &&
+             seconds + parts[k].seconds <= params.longest_burst_s;
+    };
     std::size_t next = end;
-    while (next < parts.size() && is_transition(next)) ++next;
+    while (next < parts.size() && (is_transition(next) || rings_off(next))) seconds += parts[next++].seconds;
     if (next == parts.size() || parts[next].cuts()) continue;
-    for (; i < end; ++i) parts[i].state = DrillingState::perforation;
+    for (; i < next; ++i)
+      if (i < end || parts[i].cuts()) parts[i].state = DrillingState::perforation;
   }
 }
 

@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <string>
 #include <system_error>
 #include <utility>
@@ -17,6 +18,12 @@ namespace fs = std::filesystem;
 
 constexpr const char* kAsItWas = "; an older file of that name is as it was";
 
+// libsndfile keeps the reason in errno: a full disk, or a limit of the shell.
+std::error_code reason() {
+  return errno != 0 ? std::error_code(errno, std::generic_category())
+                    : std::make_error_code(std::errc::no_space_on_device);
+}
+
 }  // namespace
 
 struct WavWriter::Impl {
@@ -25,6 +32,7 @@ struct WavWriter::Impl {
   Unfinished unfinished = Unfinished::removed;
   SNDFILE* out = nullptr;
   std::uint64_t frames = 0;
+  std::error_code why;  // of the first error
   bool failed = false, left = false;
 
   ~Impl() {
@@ -33,11 +41,14 @@ struct WavWriter::Impl {
     if (!left) fs::remove(partial, ignored);
   }
 
+  Result<void> end();  // writes the header, and closes the file
+
   [[nodiscard]] std::string not_whole(const std::error_code& why) const {
     return "the sound " + file.string() + " could not be written whole (" + why.message() + ")";
   }
   [[nodiscard]] tl::unexpected<Error> not_written(const std::error_code& why) {
     failed = true;
+    this->why = why;
     // close() still decides what becomes of a sound that is kept.
     const bool kept = unfinished == Unfinished::kept;
     return failure(ErrorCode::internal, not_whole(why) + (kept ? "" : kAsItWas));
@@ -48,6 +59,18 @@ struct WavWriter::Impl {
                    not_whole(why) + (left ? "; " + partial.string() + " has what came until then" : kAsItWas));
   }
 };
+
+Result<void> WavWriter::Impl::end() {
+  errno = 0;
+  // sf_close() does not say whether the disk took the header.
+  sf_command(out, SFC_UPDATE_HEADER_NOW, nullptr, 0);
+  const bool header = sf_error(out) == SF_ERR_NO_ERROR;
+  const std::error_code now = reason();
+  const bool closed = sf_close(std::exchange(out, nullptr)) == 0;
+  const bool whole = !failed || unfinished == Unfinished::kept;
+  if (!header || !closed || !whole) return not_closed(failed ? why : now);
+  return {};
+}
 
 WavWriter::WavWriter(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 WavWriter::~WavWriter() = default;
@@ -86,30 +109,31 @@ Result<void> WavWriter::write(std::span<const float> samples) {
   const std::uint64_t count = samples.size() / channels;
   const auto frame_bytes = static_cast<std::uint64_t>(impl_->format.channels * impl_->format.bits / 8);
   // Behind the sample that the disk did not take whole, others would be misplaced.
-  if (impl_->failed) return impl_->not_written(std::make_error_code(std::errc::no_space_on_device));
+  if (impl_->failed) return impl_->not_written(impl_->why);
   if ((impl_->frames + count) * frame_bytes > kMostBytes)
     return failure(ErrorCode::exhausted,
                    "the sound " + impl_->file.string() + " is full, because a WAV file holds 4 GB; begin another file");
+  errno = 0;
   const sf_count_t taken = sf_writef_float(impl_->out, samples.data(), static_cast<sf_count_t>(count));
   impl_->frames += static_cast<std::uint64_t>(std::max<sf_count_t>(0, taken));
-  if (taken != static_cast<sf_count_t>(count))
-    return impl_->not_written(std::make_error_code(std::errc::no_space_on_device));
+  if (taken != static_cast<sf_count_t>(count)) return impl_->not_written(reason());
   return {};
 }
 
 void WavWriter::update_header() { sf_command(impl_->out, SFC_UPDATE_HEADER_NOW, nullptr, 0); }
 
 Result<void> WavWriter::close() {
-  // sf_close() does not say whether the disk took the header.
-  update_header();
-  const bool header = sf_error(impl_->out) == SF_ERR_NO_ERROR;
-  const bool closed = sf_close(std::exchange(impl_->out, nullptr)) == 0;
-  const bool whole = !impl_->failed || impl_->unfinished == Unfinished::kept;
-  if (!header || !closed || !whole) return impl_->not_closed(std::make_error_code(std::errc::no_space_on_device));
+  if (auto ended = impl_->end(); !ended) return ended;
   std::error_code error;
   fs::rename(impl_->partial, impl_->target, error);
   if (error) return impl_->not_closed(error);
   return {};
+}
+
+Result<fs::path> WavWriter::close_apart() {
+  if (auto ended = impl_->end(); !ended) return tl::unexpected(ended.error());
+  impl_->left = true;
+  return impl_->partial;
 }
 
 std::uint64_t WavWriter::frames() const { return impl_->frames; }

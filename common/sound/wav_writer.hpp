@@ -42,6 +42,8 @@ class WavWriter {
   // Error internal: it could not be written whole, or not be renamed. What is kept then stays in FILE.partial-PID,
   // which the sentence names.
   [[nodiscard]] Result<void> close();
+  // As close(), but the file keeps its name FILE.partial-PID, which is returned: a file that is already there stays.
+  [[nodiscard]] Result<std::filesystem::path> close_apart();
   [[nodiscard]] std::uint64_t frames() const;
 
  private:

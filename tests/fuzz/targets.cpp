@@ -262,7 +262,8 @@ std::vector<Target> targets() {
       wav_file_target(),
       sound_model_target(),
       session_log_target(),
-      preset_target()};
+      preset_target(),
+      head_target()};
 }
 
 }  // namespace osteon::fuzz

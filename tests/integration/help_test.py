@@ -82,6 +82,7 @@ class Help(unittest.TestCase):
         self.assertIn("--preset", completed("osteon-audio", "--pr"))
         self.assertIn("--overwrite", completed("osteon-audio", "record", "--ov"))
         self.assertIn("--seed", completed("osteon-audio", "render", "--se"))
+        self.assertIn("--hrtf", completed("osteon-audio", "render", "--hr"))
         self.assertIn("--timeout", completed("osteon-viewer", "--ti"))
         self.assertIn("--language", completed("osteon", "--la"))
         self.assertEqual(completed("osteon-viewer", "--nothing-like-it"), [])

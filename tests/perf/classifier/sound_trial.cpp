@@ -133,7 +133,7 @@ Sounding sounding(const Drilling& drilling, std::uint64_t seed) {
   params.seed = seed;
   const auto made = audio::render_states(
       record, params,
-      [&](std::span<const float> frames) {
+      [&](std::span<const float> frames, std::span<const float>) {
         s.samples.insert(s.samples.end(), frames.begin(), frames.end());
         return Result<void>();
       },

@@ -3,10 +3,13 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
+#include "common/sound/drilling_states.hpp"
 #include "common/sound/random.hpp"
+#include "common/sound/resample.hpp"
 #include "tests/perf/classifier/gaussian_hmm.hpp"
 
 namespace osteon::test {
@@ -117,6 +120,33 @@ TEST(SoundFeatures, NoiseHasThePowerThatIsAsked) {
   double noise = 0;
   for (std::size_t i = 0; i < tone.size(); ++i) noise += std::pow(noisy[i] - tone[i], 2) / 96000;
   EXPECT_NEAR(10 * std::log10(0.5 / noise), 6.0, 0.1);
+}
+
+constexpr int kAnalysed_hz = 22050;  // of "osteon-audio analyse" (8.5.4)
+
+// "osteon-audio analyse" knows nothing of these drillings. It finds the one breakthrough of each, through two layers
+// with soft bone between them and through one alone, at the speeds of a hand-held drill.
+TEST(SoundTrial, TheAnalysisFindsEachBreakthroughOnce) {
+  for (const double rpm : {800.0, 1000.0, 1400.0}) {
+    for (std::uint64_t seed = 1; seed <= 6; ++seed) {
+      Drilling usual;
+      usual.rpm = rpm;
+      Drilling drilling = varied(usual, 5000 + seed);
+      if (seed % 3 == 0) drilling.shell = {.near_mm = 2, .between_mm = 0, .far_mm = 2.5};
+      const Sounding sound = sounding(drilling, seed);
+      const auto through = std::ranges::find(sound.classes, static_cast<int>(SoundClass::perforation));
+      ASSERT_NE(through, sound.classes.end());
+      const double at_s = kFrameStep_s * static_cast<double>(through - sound.classes.begin());
+      const std::vector<float> analysed = sound::resampled(sound.samples, 48000, kAnalysed_hz);
+      int found = 0;
+      for (const sound::StateSpan& span : sound::drilling_states(analysed, kAnalysed_hz, {.spindle_rpm = rpm})) {
+        if (span.state != sound::DrillingState::perforation) continue;
+        ++found;
+        EXPECT_NEAR(span.from_s, at_s, 0.1);
+      }
+      EXPECT_EQ(found, 1) << rpm << " rpm, seed " << seed << ", through at " << at_s << " s";
+    }
+  }
 }
 
 TEST(SoundTrial, CountsWhatIsRight) {

@@ -253,6 +253,29 @@ TEST(SoundAnalysis, SilenceIsDarkAndSaysThatNoDrillWasHeard) {
   EXPECT_THAT(to_text(drill), testing::Not(testing::HasSubstr("note")));
 }
 
+TEST(SoundAnalysis, NamesOfShortStatesDoNotLieOnEachOther) {
+  SoundAnalysis analysis = analyse({.rate_hz = kAnalysisRate_hz, .samples = std::vector<float>(22050, 0.0F)}, {});
+  using enum sound::DrillingState;
+  // "perforation" is wider than its span, and "free" begins within it.
+  analysis.states = {{cortical, 0, 0.5}, {perforation, 0.5, 0.53}, {free, 0.53, 1.0}};
+  const std::vector<NamedPicture> pictures = pictures_of(analysis, {});
+  const auto spectrogram = std::ranges::find(pictures, "spectrogram.png", &NamedPicture::file);
+  ASSERT_NE(spectrogram, pictures.end());
+  // The frame begins at (64, 24) and is 1020 wide. A name begins 3 pixels behind its span's line, and lines of names
+  // are 10 pixels apart.
+  const auto white = [&](double from_s, double to_s, int line) {
+    int count = 0;
+    for (int x = 64 + static_cast<int>(1020 * from_s) + 3; x < 64 + static_cast<int>(1020 * to_s) - 3; ++x)
+      for (int y = 24 + 3 + 10 * line; y < 24 + 10 + 10 * line; ++y) count += spectrogram->picture.at(x, y) == kPaper;
+    return count;
+  };
+  EXPECT_GT(white(0.0, 0.2, 0), 20) << "cortical";
+  EXPECT_EQ(white(0.0, 0.2, 1), 0);
+  EXPECT_GT(white(0.5, 0.53, 0), 20) << "perforation";
+  EXPECT_GT(white(0.53, 0.6, 1), 20) << "free";
+  EXPECT_EQ(white(0.6, 1.0, 0), 0);
+}
+
 TEST(SoundAnalysis, NamesOfLinesBeyondTheAxisAreNotWritten) {
   // At 6000 rpm the motor's mesh and commutation x2 and x3 are beyond 11025 Hz.
   AnalysisParams fast, slow;

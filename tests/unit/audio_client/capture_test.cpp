@@ -126,6 +126,18 @@ TEST_F(RecordCommand, NeverLosesAFileThatIsThere) {
   EXPECT_EQ(*read_file(file()), "an operation that nobody can repeat");
 }
 
+// A file that is not there cannot be lost: what came until the disk was full gets the name.
+TEST_F(RecordCommand, AFullDiskKeepsWhatCame) {
+  const auto ran = test::run("bash", {"-c", "ulimit -f 256 && exec \"$@\"", "record",
+                                      test::program("osteon-audio").string(), "record", file(), "--seconds", "20"});
+  EXPECT_EQ(ran.exit_code, 1);
+  EXPECT_THAT(ran.err, AllOf(HasSubstr("File too large"), HasSubstr("x.wav has what came until then")));
+  const auto sound = sound::read_wav(file());
+  ASSERT_TRUE(sound) << sound.error().message;
+  EXPECT_NEAR(sound->seconds(), 256 * 1024 / (3 * 48000.0), 0.05);
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(temp_.path()), {}), 1);
+}
+
 TEST_F(RecordCommand, NamesTheSourcesThatAreThere) {
   const auto ran = record({file(), "--seconds", "1", "--device", "theatre 7"});
   EXPECT_EQ(ran.exit_code, 1);
@@ -141,19 +153,23 @@ TEST_F(RecordCommand, SaysThatNoServerAnswers) {
   EXPECT_FALSE(std::filesystem::exists(file()));
 }
 
-// The last one: it ends the server of deploy/with-null-sink. A recording is no longer than the time that it took.
-TEST_F(RecordCommand, WithoutItsServerNoSoundIsMadeUp) {
+// The last one: it ends the server of deploy/with-null-sink. A recording is no longer than the time that it took. One
+// that was not finished replaces nothing.
+TEST_F(RecordCommand, WithoutItsServerNoSoundIsMadeUpAndNoneIsLost) {
+  ASSERT_TRUE(write_file(file(), "an operation that nobody can repeat"));
   const auto begin = std::chrono::steady_clock::now();
-  test::Process audio(test::program("osteon-audio"), {"record", file()});
+  test::Process audio(test::program("osteon-audio"), {"record", file(), "--overwrite"});
   const auto partial = temp_ / ("x.wav.partial-" + std::to_string(audio.pid()));
   std::error_code none;
   ASSERT_TRUE(test::wait_until([&] { return std::filesystem::file_size(partial, none) > 100'000 && !none; }, 30s))
       << audio.err();
   EXPECT_EQ(test::run("pactl", {"exit"}).exit_code, 0);
   EXPECT_EQ(audio.wait(30s), 1);
-  EXPECT_THAT(audio.err(), HasSubstr("has what came until then"));
+  EXPECT_THAT(audio.err(),
+              AllOf(HasSubstr(partial.string() + " has what came until then"), HasSubstr(file() + " is as it was")));
+  EXPECT_EQ(*read_file(file()), "an operation that nobody can repeat");
   const std::chrono::duration<double> took = std::chrono::steady_clock::now() - begin;
-  const auto sound = sound::read_wav(file());
+  const auto sound = sound::read_wav(partial);
   ASSERT_TRUE(sound) << sound.error().message;
   EXPECT_GT(sound->seconds(), 0.5);
   EXPECT_LT(sound->seconds(), took.count());

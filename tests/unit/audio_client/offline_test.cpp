@@ -4,11 +4,13 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <chrono>
 #include <cmath>
 #include <csignal>
 #include <fstream>
+#include <memory>
 #include <span>
 #include <string>
 #include <thread>
@@ -24,6 +26,7 @@
 #include "tests/support/process.hpp"
 #include "tests/support/temp_dir.hpp"
 #include "tests/support/wait.hpp"
+#include "tests/unit/audio_client/ideal_head.hpp"
 #include "tests/unit/audio_client/scripted_drilling.hpp"
 
 namespace osteon::audio {
@@ -62,45 +65,89 @@ class ListedStates final : public StateRecord {
   std::size_t next_ = 0;
 };
 
-std::vector<float> rendered(StateRecord& record) {
-  std::vector<float> samples;
+struct Sides {
+  std::vector<float> left, right;
+};
+
+Sides rendered(StateRecord& record, const SynthParams& params = {}) {
+  Sides sides;
   const auto sound = render_states(
-      record, {},
-      [&](std::span<const float> frames) {
-        samples.insert(samples.end(), frames.begin(), frames.end());
+      record, params,
+      [&](std::span<const float> left, std::span<const float> right) {
+        sides.left.insert(sides.left.end(), left.begin(), left.end());
+        sides.right.insert(sides.right.end(), right.begin(), right.end());
         return Result<void>();
       },
       [](double) { return true; });
   EXPECT_TRUE(sound) << sound.error().message;
-  return samples;
+  return sides;
 }
 
 std::atomic<std::int64_t> clock_ns = 0;
 
 // What the live program does, with buffers that begin at the first state, and a clock that goes from one to the next.
-std::vector<float> live(const std::vector<CuttingState>& states, std::size_t frames) {
-  SoundEngine engine(SynthParams{}, []() noexcept -> std::int64_t { return clock_ns; });
-  std::vector<float> samples(frames), right(kBuffer);
+Sides live(const std::vector<CuttingState>& states, std::size_t frames, const SynthParams& params) {
+  SoundEngine engine(params, []() noexcept -> std::int64_t { return clock_ns; });
+  Sides sides{std::vector<float>(frames), std::vector<float>(frames)};
   std::size_t next = 0;
   for (std::size_t at = 0; at + kBuffer <= frames; at += kBuffer) {
     const std::int64_t now_ns = kBegin_ns + std::llround(1e9 * static_cast<double>(at) / test::kRate_hz);
     for (; next < states.size() && states[next].time_ns <= now_ns; ++next)
       engine.deliver(sound_scene(std::span(&states[next], 1), states[next].time_ns));
     clock_ns = now_ns;
-    engine.render(std::span(samples).subspan(at, kBuffer), right);
+    engine.render(std::span(sides.left).subspan(at, kBuffer), std::span(sides.right).subspan(at, kBuffer));
   }
-  return samples;
+  return sides;
 }
 
-TEST(OfflineSound, IsThatOfTheLiveEngineBitForBit) {
-  const std::vector<CuttingState> states = timed_states();
+// A listener beside a tool that moves to and fro in front of it.
+SynthParams heard_over(Listening way) {
+  SynthParams params;
+  params.space.listening = way;
+  params.space.pose_bone_head = looking(usual_listener_mm(way), Vec3::Zero(), -Vec3::UnitY());
+  if (way == Listening::headphones)
+    params.space.hrtf = std::make_shared<const Hrtf>(
+        *Hrtf::make(test::sphere([](double along) { return 0.55 + 0.45 * along; }), test::kRate_hz));
+  return params;
+}
+
+class OfflineSoundOver : public testing::TestWithParam<Listening> {};
+
+TEST_P(OfflineSoundOver, IsThatOfTheLiveEngineBitForBit) {
+  std::vector<CuttingState> states = timed_states();
+  for (std::size_t i = 0; i < states.size(); ++i)
+    states[i].pose_bone_tool.position_mm = {0, 0, 100 * std::sin(0.01 * static_cast<double>(i))};
   ListedStates record(states);
-  const std::vector<float> offline = rendered(record);
+  const Sides offline = rendered(record, heard_over(GetParam()));
   const std::size_t common = 48000 * states.size() / 120 / kBuffer * kBuffer;
-  ASSERT_GT(offline.size(), common);
-  const std::vector<float> engine = live(states, common);
-  EXPECT_GT(*std::ranges::max_element(engine), 0.1F);
-  EXPECT_TRUE(std::equal(engine.begin(), engine.end(), offline.begin()));
+  ASSERT_GT(offline.left.size(), common);
+  const Sides engine = live(states, common, heard_over(GetParam()));
+  EXPECT_GT(*std::ranges::max_element(engine.left), 0.1F);
+  EXPECT_TRUE(std::equal(engine.left.begin(), engine.left.end(), offline.left.begin()));
+  EXPECT_TRUE(std::equal(engine.right.begin(), engine.right.end(), offline.right.begin()));
+  EXPECT_EQ(offline.left == offline.right, GetParam() == Listening::mono);
+}
+
+INSTANTIATE_TEST_SUITE_P(EachWay, OfflineSoundOver,
+                         testing::Values(Listening::mono, Listening::loudspeakers, Listening::headphones));
+
+TEST(OfflineSound, LooksAtTheMiddleOfTheWorkInBone) {
+  const auto middle_of = [](const std::vector<std::pair<CuttingPhase, Vec3>>& places) {
+    std::vector<CuttingState> states;
+    for (const auto& [phase, tip_mm] : places) {
+      states.push_back(test::free_drill(1400));
+      states.back().phase = phase;
+      states.back().pose_bone_tool.position_mm = tip_mm;
+    }
+    ListedStates record(states);
+    const auto middle_mm = middle_of_work(record, [](double) { return true; });
+    EXPECT_TRUE(middle_mm);
+    return *middle_mm;
+  };
+  using enum CuttingPhase;
+  EXPECT_EQ(middle_of({{free, {500, 0, 0}}, {cutting, {1, 2, 3}}, {rubbing, {3, 6, 9}}, {idle, {0, 900, 0}}}),
+            Vec3(2, 4, 6));
+  EXPECT_EQ(middle_of({{free, {4, 0, 0}}, {idle, {0, 2, 0}}}), Vec3(2, 1, 0)) << "nothing touched bone";
 }
 
 TEST(OfflineSound, RunsDownAfterTheLastStateAndInAGap) {
@@ -112,7 +159,7 @@ TEST(OfflineSound, RunsDownAfterTheLastStateAndInAGap) {
     states.back().time_ns = kBegin_ns + i * 8'333'333LL + (i < 120 ? 0 : 5'000'000'000LL);
   }
   ListedStates record(states);
-  const std::vector<float> samples = rendered(record);
+  const std::vector<float> samples = rendered(record).left;
   const auto loudest = [&](double from_s, double to_s) {
     const auto part = std::span(samples).subspan(static_cast<std::size_t>(from_s * 48000),
                                                  static_cast<std::size_t>((to_s - from_s) * 48000));
@@ -130,7 +177,8 @@ TEST(OfflineSound, RunsDownAfterTheLastStateAndInAGap) {
 TEST(OfflineSound, StopsWhenItIsAsked) {
   ListedStates record(timed_states());
   const auto sound = render_states(
-      record, {}, [](std::span<const float>) { return Result<void>(); }, [](double done) { return done < 0.5; });
+      record, {}, [](std::span<const float>, std::span<const float>) { return Result<void>(); },
+      [](double done) { return done < 0.5; });
   ASSERT_FALSE(sound);
   EXPECT_EQ(sound.error().code, ErrorCode::cancelled);
 }
@@ -188,6 +236,7 @@ TEST(StateRecord, ReadsWhatTheHapticClientWrites) {
       ASSERT_EQ((*state)->spindle_rpm, expected.report.spindle_rpm);
       ASSERT_EQ((*state)->feed_mm_per_s, expected.report.cutting.feed_mm_per_s);
       ASSERT_EQ((*state)->density_g_cm3, 1.5);
+      ASSERT_EQ((*state)->engaged_fraction, 0.75);
       ASSERT_EQ((*state)->torque_Nmm, expected.report.cutting.torque_nmm);
       ASSERT_EQ((*state)->force_physical_N.norm(), 5.0);
       ASSERT_EQ((*state)->pose_bone_tool.position_mm, Vec3(1, 2, 3));
@@ -267,9 +316,11 @@ TEST(RenderCommand, WritesTheSoundOfALog) {
   const test::TempDir temp;
   ASSERT_TRUE(write_file(temp / "log.csv", long_log(240)));
   const auto ran = test::run(test::program("osteon-audio"),
-                             {"render", (temp / "log.csv").string(), "--out", (temp / "x.wav").string()});
+                             {"render", (temp / "log.csv").string(), "--out", (temp / "x.wav").string(), "--listen",
+                              "mono", "--listener", "0", "0", "0"});
   ASSERT_EQ(ran.exit_code, 0) << ran.err;
-  EXPECT_THAT(ran.out, AllOf(HasSubstr("states     240"), HasSubstr("times as fast as it sounds")));
+  EXPECT_THAT(ran.out, AllOf(HasSubstr("states     240"), HasSubstr("listener   mono"),
+                             HasSubstr("times as fast as it sounds")));
   const auto sound = sound::read_wav(temp / "x.wav");
   ASSERT_TRUE(sound) << sound.error().message;
   // The last state is 239 / 120 s after the first; then the drill runs down within half a second.
@@ -277,9 +328,66 @@ TEST(RenderCommand, WritesTheSoundOfALog) {
   EXPECT_LT(sound->seconds(), 3.0);
   const auto record = open_states(temp / "log.csv");
   ASSERT_TRUE(record);
-  const std::vector<float> expected = rendered(**record);
+  const std::vector<float> expected = rendered(**record).left;
   ASSERT_EQ(sound->samples.size(), expected.size());
   for (std::size_t i = 0; i < expected.size(); i += 7) ASSERT_NEAR(sound->samples[i], expected[i], 1.1 / 32768) << i;
+}
+
+// A second of cutting at the patient's head, and one at the feet. The usual listener looks between them, from the
+// patient's right side.
+std::string log_of_both_ends() {
+  std::string text = "mono_ns,phase,tool,rpm,feed_mm_per_s,density_g_cm3,force_physical_n,torque_nmm,tip_z_mm\n";
+  for (int i = 0; i < 240; ++i)
+    text += std::to_string(kBegin_ns + 8'333'333LL * i) + ",cutting,drill-3.2,1345,0.89,1.9,27,25," +
+            (i < 120 ? "1100" : "900") + "\n";
+  return text;
+}
+
+double rms(std::span<const float> samples) {
+  double sum = 0;
+  for (const float x : samples) sum += static_cast<double>(x) * static_cast<double>(x);
+  return std::sqrt(sum / static_cast<double>(samples.size()));
+}
+
+TEST(RenderCommand, PutsTheWorkBetweenBothChannels) {
+  const test::TempDir temp;
+  ASSERT_TRUE(write_file(temp / "log.csv", log_of_both_ends()));
+  for (const std::string way : {"", "loudspeakers", "headphones"}) {
+    SCOPED_TRACE(way);
+    std::vector<std::string> arguments = {"render", (temp / "log.csv").string(), "--out", (temp / "x.wav").string()};
+    if (!way.empty()) arguments.insert(arguments.end(), {"--listen", way});
+    const auto ran = test::run(test::program("osteon-audio"), arguments);
+    ASSERT_EQ(ran.exit_code, 0) << ran.err;
+    EXPECT_THAT(ran.out, HasSubstr("listener   " + (way.empty() ? "loudspeakers" : way)));
+    std::array<double, 2> left{}, right{};
+    for (const auto channel : {sound::Channel::left, sound::Channel::right}) {
+      const auto sound = sound::read_wav(temp / "x.wav", {.channel = channel, .from_s = 0, .to_s = {}});
+      ASSERT_TRUE(sound) << sound.error().message;
+      for (std::size_t end : {0U, 1U})
+        (channel == sound::Channel::left ? left : right)[end] =
+            rms(std::span(sound->samples).subspan(24000 + 48000 * end, 19200));
+    }
+    // The other end is the mirror image; the flutter of the lines is not.
+    EXPECT_GT(left[0], 1.15 * right[0]);
+    EXPECT_GT(right[1], 1.15 * left[1]);
+    EXPECT_NEAR(left[0] / right[1], 1.0, 0.2);
+  }
+}
+
+TEST(RenderCommand, RefusesAListenerThatCannotBe) {
+  const test::TempDir temp;
+  ASSERT_TRUE(write_file(temp / "log.csv", long_log(10)));
+  const auto refused = [&](std::vector<std::string> more) {
+    more.insert(more.begin(), {"render", (temp / "log.csv").string(), "--out", (temp / "x.wav").string()});
+    const auto ran = test::run(test::program("osteon-audio"), more);
+    EXPECT_EQ(ran.exit_code, 1);
+    EXPECT_FALSE(std::filesystem::exists(temp / "x.wav"));
+    return ran.err;
+  };
+  EXPECT_THAT(refused({"--listen", "tin"}), HasSubstr("headphones"));
+  EXPECT_THAT(refused({"--listener", "0", "0", "0"}), HasSubstr("--listener 0 0 0"));
+  EXPECT_THAT(refused({"--hrtf", "a.sofa"}), HasSubstr("--listen headphones"));
+  EXPECT_THAT(refused({"--listen", "headphones", "--rate", "96000"}), HasSubstr("--rate of headphones is at most"));
 }
 
 // A drill of one's own, which has nothing but one line: that of its spindle's tenth order.
@@ -290,8 +398,9 @@ TEST(RenderCommand, PlaysAToolByItsPreset) {
                          "name: own\ntools: [drill]\ndrive: rotation\nrated_rpm: 1345\n"
                          "lines:\n  - {order: 10, level_db: -20, source: shaft}\n"));
   const std::string own = (temp / "own.yaml").string();
-  const auto ran = test::run(test::program("osteon-audio"), {"render", (temp / "log.csv").string(), "--out",
-                                                             (temp / "x.wav").string(), "--preset", own});
+  const auto ran = test::run(
+      test::program("osteon-audio"),
+      {"render", (temp / "log.csv").string(), "--out", (temp / "x.wav").string(), "--preset", own, "--listen", "mono"});
   ASSERT_EQ(ran.exit_code, 0) << ran.err;
   const auto sound = sound::read_wav(temp / "x.wav");
   ASSERT_TRUE(sound) << sound.error().message;
@@ -313,17 +422,69 @@ TEST(RenderCommand, RefusesToLoseTheRecord) {
   EXPECT_EQ(*read_file(temp / "log.csv"), long_log(10));
 }
 
-TEST(RenderCommand, LeavesNoPartOfASoundWhenItIsStopped) {
+class RenderStopped : public testing::TestWithParam<int> {};
+
+TEST_P(RenderStopped, LeavesNoPartOfASound) {
+  std::signal(SIGHUP, SIG_DFL);  // perhaps the tests were started by nohup
   const test::TempDir temp;
   ASSERT_TRUE(write_file(temp / "log.csv", long_log(120 * 1800)));
   test::Process audio(test::program("osteon-audio"),
                       {"render", (temp / "log.csv").string(), "--out", (temp / "x.wav").string()});
   ASSERT_TRUE(audio.wait_for_percent(1, 60s)) << audio.err();
-  audio.signal(SIGINT);
+  audio.signal(GetParam());
   EXPECT_EQ(audio.wait(30s), 130);
   EXPECT_THAT(audio.err(), HasSubstr("stopped"));
   for (const auto& entry : std::filesystem::directory_iterator(temp.path()))
     EXPECT_EQ(entry.path().filename(), "log.csv");
+}
+
+INSTANTIATE_TEST_SUITE_P(EachSignal, RenderStopped, testing::Values(SIGINT, SIGTERM, SIGHUP));
+
+// The shell's limit on the size of files, 64 blocks of 1024 bytes.
+TEST(RenderCommand, SaysThatTheFileBecomesTooLarge) {
+  const test::TempDir temp;
+  ASSERT_TRUE(write_file(temp / "log.csv", long_log(1200)));
+  ASSERT_TRUE(write_file(temp / "x.wav", "an older sound"));
+  const auto ran =
+      test::run("bash", {"-c", "ulimit -f 64 && exec \"$@\"", "render", test::program("osteon-audio").string(),
+                         "render", (temp / "log.csv").string(), "--out", (temp / "x.wav").string()});
+  EXPECT_EQ(ran.exit_code, 1);
+  EXPECT_THAT(ran.err, AllOf(HasSubstr("x.wav could not be written whole (File too large)"),
+                             HasSubstr("an older file of that name is as it was")));
+  EXPECT_EQ(*read_file(temp / "x.wav"), "an older sound");
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(temp.path()), {}), 2);
+}
+
+TEST(RenderCommand, TakesNoSeedThatItWouldChange) {
+  const test::TempDir temp;
+  ASSERT_TRUE(write_file(temp / "log.csv", long_log(10)));
+  const auto render = [&](const char* seed) {
+    return test::run(test::program("osteon-audio"),
+                     {"render", (temp / "log.csv").string(), "--out", (temp / "x.wav").string(), "--seed", seed});
+  };
+  for (const char* seed : {"-1", "18446744073709551616", "1.5"}) {
+    const auto ran = render(seed);
+    EXPECT_EQ(ran.exit_code, 1);
+    EXPECT_THAT(ran.err, HasSubstr(std::string("--seed: ") + seed + " is no whole number"));
+  }
+  EXPECT_EQ(render("18446744073709551615").exit_code, 0);
+}
+
+TEST(RenderCommand, NamesAToolThatItDoesNotKnow) {
+  const test::TempDir temp;
+  std::string log = long_log(10);
+  const auto render = [&] {
+    EXPECT_TRUE(write_file(temp / "log.csv", log));
+    const auto ran = test::run(test::program("osteon-audio"),
+                               {"render", (temp / "log.csv").string(), "--out", (temp / "x.wav").string()});
+    EXPECT_EQ(ran.exit_code, 0) << ran.err;
+    return ran.out;
+  };
+  EXPECT_THAT(render(), testing::Not(HasSubstr("note")));
+  const std::size_t row = log.find("drill-3.2", log.find("drill-3.2") + 1);
+  log.replace(row, 9, "drill3.2");
+  EXPECT_THAT(render(), AllOf(HasSubstr("log.csv: line 3: tool is \"drill3.2\""), HasSubstr("sounds like a drill"),
+                              HasSubstr("known are"), HasSubstr("drill-3.2"), HasSubstr("burr-round-5")));
 }
 
 }  // namespace

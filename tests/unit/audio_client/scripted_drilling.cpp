@@ -60,11 +60,13 @@ ScriptedDrilling scripted_drilling() {
   // The speed droops under load by a twentieth, the most that the dissertation's motor shows.
   const CuttingState off = idle_drill(), free = free_drill(1400), cortical = cortical_drill(1345),
                      cancellous = cancellous_drill(1380);
-  CuttingState plunge = cortical;  // the far cortex gives way: no force, and the hand goes on
+  CuttingState plunge =
+      cortical;  // the far cortex gives way: no force, and the hand goes on with the last of the point
   plunge.feed_mm_per_s = 60;
   plunge.force_physical_N = Vec3(0, 0, 0.5);
   plunge.torque_Nmm = 0.5;
   plunge.density_g_cm3 = 0.4;
+  plunge.engaged_fraction = 0.02;
   plunge.spindle_rpm = 1400;
 
   struct Step {

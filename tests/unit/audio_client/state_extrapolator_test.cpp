@@ -75,7 +75,8 @@ TEST(StateExtrapolator, AFallOfTheLoadIsNoBreakthrough) {
     return sound::tone_db(later, 48000, 200.0);
   };
   ToolSound through = ahead;
-  through.load_ahead = 0.0;  // a state has said so
+  through.load_ahead = 0.0;  // a state has said so, and that the bone is gone
+  through.bone_g_cm3 = 0.0;
   EXPECT_GT(burst_db(through), burst_db(ahead) + 10.0);
 }
 

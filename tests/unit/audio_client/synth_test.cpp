@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <functional>
 #include <numbers>
 #include <numeric>
 #include <vector>
@@ -208,20 +209,72 @@ TEST(DrillSound, RunsUpAndDownInsteadOfJumping) {
   EXPECT_TRUE(synth.silent());
 }
 
-TEST(DrillSound, KnocksWhenBoneGivesWayAndNotWhenDrawnBack) {
-  // 8.5.4: perforation is a burst of energy round 200 Hz, compared here with the running drill alone.
-  const auto low_after_db = [](const CuttingState& last) {
-    DrillSynth synth = make_synth(1, kPure);
-    static_cast<void>(play(synth, cortical_drill(1345), 0.75));
-    if (last.phase != CuttingPhase::cutting) static_cast<void>(play(synth, last, 1.0));
-    const std::vector<float> after = play(synth, free_drill(1345), 0.1);
-    // After the fall of the load itself, and within the knock's decay.
-    return sound::band_db(sound::power_spectrum(std::span(after).subspan(1200, 2048), kRate_hz, 2048), 100, 300);
-  };
-  CuttingState drawn_back = cortical_drill(1345);
-  drawn_back.phase = CuttingPhase::rubbing;
-  drawn_back.feed_mm_per_s = 0;
-  EXPECT_GT(low_after_db(cortical_drill(1345)), low_after_db(drawn_back) + 10);
+// The level near 200 Hz after a drill has gone 1 mm/s deeper in cortical bone for a second, and then goes on as `after`
+// says. 8.5.4: perforation is a burst of energy there. Noise is off, so that the drill alone is compared.
+double low_after_cortex_db(const std::function<CuttingState(int number, const CuttingState& last)>& after) {
+  DrillSynth synth = make_synth(1, kPure);
+  CuttingState state = cortical_drill(1345);
+  for (int i = 0; i < 120; ++i) {
+    state.pose_bone_tool.position_mm.z() -= 1.0 / 120;
+    static_cast<void>(play(synth, std::vector{state}));
+  }
+  std::vector<float> samples;
+  for (int i = 0; i < 12; ++i) {
+    const std::vector<float> part = play(synth, std::vector{after(i, state)});
+    samples.insert(samples.end(), part.begin(), part.end());
+  }
+  // After the fall of the load itself, and within the knock's decay.
+  return sound::band_db(sound::power_spectrum(std::span(samples).subspan(2000, 2048), kRate_hz, 2048), 100, 300);
+}
+
+// A state without bone, whose tip has gone on in the air.
+CuttingState gone_on(const CuttingState& last, double mm) {
+  CuttingState state = free_drill(1345);
+  state.pose_bone_tool.position_mm = last.pose_bone_tool.position_mm - Vec3(0, 0, mm);
+  return state;
+}
+
+TEST(DrillSound, KnocksWhenBoneGivesWay) {
+  // A hand falls by 45 mm/s.
+  const double through_db = low_after_cortex_db([](int i, const auto& last) { return gone_on(last, 0.375 * (i + 1)); });
+  const double drawn_back_db =
+      low_after_cortex_db([](int i, const auto& last) { return gone_on(last, -0.375 * (i + 1)); });
+  EXPECT_GT(through_db, drawn_back_db + 10);
+  // The last of the point is still in bone, and goes on.
+  const double last_of_point_db = low_after_cortex_db([](int, const CuttingState& last) {
+    CuttingState state = last;
+    state.engaged_fraction = 0.01;
+    state.force_physical_N = Vec3(0, 0, 0.5);
+    state.torque_Nmm = 0.5;
+    return state;
+  });
+  EXPECT_NEAR(last_of_point_db, through_db, 3);
+}
+
+TEST(DrillSound, DoesNotKnockWhenAStateLacksBoneOrForce) {
+  const double knock_db =
+      low_after_cortex_db([](int i, const auto& last) { return gone_on(last, 0.375 * (i + 1)); }) - 10;
+  // The haptic loop waits for its part of the bone: neither bone nor load, and the tip stays where the last tick was.
+  EXPECT_LT(low_after_cortex_db([](int, const auto& last) { return gone_on(last, 0.01); }), knock_db);
+  // It comes back in the same bone.
+  EXPECT_LT(low_after_cortex_db([](int i, const auto& last) { return i < 6 ? gone_on(last, 0) : last; }), knock_db);
+  // The hand eases off, and the drill still feeds a little.
+  EXPECT_LT(low_after_cortex_db([](int, const CuttingState& last) {
+              CuttingState state = last;
+              state.force_physical_N = Vec3(0, 0, 0.5);
+              state.torque_Nmm = 0.5;
+              state.feed_mm_per_s = 0.01;
+              return state;
+            }),
+            knock_db);
+  // The drill's side rubs, and slips a little.
+  EXPECT_LT(low_after_cortex_db([](int, const auto& last) {
+              CuttingState state = gone_on(last, 0.2);
+              state.phase = CuttingPhase::rubbing;
+              state.force_physical_N = Vec3(0, 0, 5);
+              return state;
+            }),
+            knock_db);
 }
 
 TEST(DrillSound, SilentAtRest) {

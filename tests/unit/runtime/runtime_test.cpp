@@ -128,6 +128,25 @@ TEST(StopSignal, IsRaisedBySigterm) {
   EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 0);
 }
 
+TEST(StopSignal, IsRaisedByAHangUpIfAsked) {
+  // Returns what ended a child that was hung up on: an exit code, or the signal.
+  const auto hung_up = [](StopSignal::HangUp hang_up, void (*before)(int)) {
+    const pid_t child = ::fork();
+    if (child == 0) {
+      ::signal(SIGHUP, before);
+      StopSignal stop(hang_up);
+      ::kill(::getpid(), SIGHUP);
+      ::_exit(stop.wait_for(100ms) ? 1 : 2);
+    }
+    int status = -1;
+    ::waitpid(child, &status, 0);
+    return WIFEXITED(status) ? WEXITSTATUS(status) : 100 + WTERMSIG(status);
+  };
+  EXPECT_EQ(hung_up(StopSignal::HangUp::stops, SIG_DFL), 1);
+  EXPECT_EQ(hung_up(StopSignal::HangUp::ends, SIG_DFL), 100 + SIGHUP);
+  EXPECT_EQ(hung_up(StopSignal::HangUp::stops, SIG_IGN), 2) << "nohup started it";
+}
+
 // If somebody presses Ctrl-C again, the program must still write everything before it ends.
 TEST(StopSignal, ASecondSigintCutsNothingOff) {
   const pid_t child = ::fork();

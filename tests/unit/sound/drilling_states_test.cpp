@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <string>
 
 #include "common/sound/drilling_states.hpp"
@@ -74,6 +75,44 @@ TEST(DrillingStates, KnownStatesAreFoundWithinFiftyMilliseconds) {
     SCOPED_TRACE(words(found));
     expect_states(found, drilling());
   }
+}
+
+// The modes of a hand piece ring off exponentially, and so pass the level of cancellous bone on their way to the free
+// drill's. At 145 dB in a second that takes 0.05 to 0.1 s.
+TEST(DrillingStates, ABurstThatRingsOffIsNoBone) {
+  constexpr double kDecay_s = 0.06, kLoudest_db = -6;
+  for (const bool through_soft : {false, true}) {
+    for (unsigned seed = 1; seed <= 12; ++seed) {
+      std::vector<Scene> scenes = drilling();
+      if (!through_soft) scenes.erase(scenes.begin() + 3, scenes.begin() + 5);
+      const std::size_t burst = scenes.size() - 3;
+      scenes[burst] = {DrillingState::free, 0.2, -38, -32, -35};  // below the burst the drill already runs free
+      std::vector<float> samples = played(scenes, 100 * seed);
+      double at_s = 0;
+      for (std::size_t i = 0; i < burst; ++i) at_s += scenes[i].seconds;
+      for (auto n = static_cast<std::size_t>(at_s * kAnalysed_hz); n < samples.size(); ++n) {
+        const double t_s = static_cast<double>(n) / kAnalysed_hz - at_s;
+        samples[n] += static_cast<float>(amplitude(kLoudest_db) * std::exp(-t_s / kDecay_s) *
+                                         std::sin(2 * std::numbers::pi * 200 * t_s));
+      }
+      const auto found = drilling_states(samples, kAnalysed_hz);
+      SCOPED_TRACE(words(found));
+      ASSERT_EQ(found.size(), scenes.size());
+      EXPECT_EQ(found[burst].state, DrillingState::perforation);
+      EXPECT_NEAR(found[burst].from_s, at_s, kTolerance_s);
+      EXPECT_EQ(found[burst + 1].state, DrillingState::free);
+      EXPECT_LT(found[burst].to_s, at_s + 0.3) << "by then it is below the free drill";
+    }
+  }
+}
+
+// A drill that goes on in soft bone after a loud moment has not broken through.
+TEST(DrillingStates, SoftBoneAfterABurstIsBone) {
+  std::vector<Scene> scenes = drilling();
+  scenes[6] = {DrillingState::cancellous, 0.9, -33, -31, -27, -40};
+  const auto found = drilling_states(played(scenes, 4), kAnalysed_hz);
+  SCOPED_TRACE(words(found));
+  for (const StateSpan& span : found) EXPECT_NE(span.state, DrillingState::perforation);
 }
 
 TEST(DrillingStates, LoudnessOfTheRecordingDoesNotMatter) {
