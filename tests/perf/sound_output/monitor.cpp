@@ -12,13 +12,9 @@
 namespace osteon::test {
 namespace {
 
+constexpr std::size_t kFragment_frames = 1024;  // the most at once; less is sent as soon as it is there
 constexpr std::size_t kLeastFragment_frames = 32;
 constexpr int kPriority = 10;  // below the callback of the sound
-
-struct Fragment {
-  std::size_t begin = 0, end = 0;  // frames
-  std::int64_t at_ns = 0;
-};
 
 tl::unexpected<Error> no_monitor(const std::string& why) {
   return failure(ErrorCode::unavailable, "the sink cannot be recorded (" + why + "); run it by deploy/with-null-sink");
@@ -27,6 +23,11 @@ tl::unexpected<Error> no_monitor(const std::string& why) {
 }  // namespace
 
 struct Monitor::Impl {
+  struct Fragment {
+    std::size_t begin = 0, end = 0;  // frames
+    std::int64_t at_ns = 0;
+  };
+
   explicit Impl(std::size_t most_frames) : frames(most_frames), fragments(most_frames / kLeastFragment_frames) {}
   ~Impl() {
     if (!loop) return;
@@ -115,7 +116,7 @@ Result<void> Monitor::Impl::open(const std::string& sink_name) {
       stream, [](pa_stream*, std::size_t, void* self) { static_cast<Impl*>(self)->take(); }, this);
   pa_buffer_attr fragments_of{};
   std::memset(&fragments_of, 0xFF, sizeof fragments_of);  // the server's own choice
-  fragments_of.fragsize = kLeastFragment_frames * sizeof(Frame);
+  fragments_of.fragsize = kFragment_frames * sizeof(Frame);
   if (pa_stream_connect_record(stream, (sink_name + ".monitor").c_str(), &fragments_of, PA_STREAM_NOFLAGS) < 0)
     return no_monitor(pa_strerror(pa_context_errno(context)));
   while (pa_stream_get_state(stream) != PA_STREAM_READY) {
@@ -143,7 +144,7 @@ std::span<const Frame> Monitor::frames() const noexcept {
 
 std::int64_t Monitor::arrival_ns(std::size_t frame) const {
   const auto known = std::span(impl_->fragments).first(impl_->fragment_count.load(std::memory_order_acquire));
-  const auto found = std::ranges::upper_bound(known, frame, {}, &Fragment::end);
+  const auto found = std::ranges::upper_bound(known, frame, {}, &Impl::Fragment::end);
   return found == known.end() ? std::numeric_limits<std::int64_t>::max() : found->at_ns;
 }
 
@@ -151,7 +152,7 @@ Monitor::Clock Monitor::clock(std::size_t from_frame, std::size_t to_frame) cons
   const auto known = std::span(impl_->fragments).first(impl_->fragment_count.load(std::memory_order_acquire));
   Clock clock;
   std::vector<std::int64_t> starts_ns;
-  for (const Fragment& fragment : known)
+  for (const Impl::Fragment& fragment : known)
     if (fragment.begin >= from_frame && fragment.end <= to_frame)
       starts_ns.push_back(fragment.at_ns - Clock{}.played_ns(fragment.begin));
   if (starts_ns.empty()) return clock;
