@@ -26,6 +26,7 @@ int main(int argc, char** argv) {
     command->add_option("--buffers", trial.output.buffers)->check(CLI::Range(2, 64));
   }
   if (const auto code = parse_arguments(app, argc, argv)) return *code;
+  log::open(kName);
   const Result<nlohmann::json> found = gapless->parsed() ? test::play_without_gaps(trial) : test::time_cuts(trial);
   if (!found) return log::exit_with(kName, found.error());
   std::printf("%s\n", found->dump(1).c_str());
