@@ -153,8 +153,8 @@ FIGURES = [
            "sound_output", ("==", 0), baseline="gaps by the output's own clock", full=True),
     Figure("sound_output_differing", "count", "frames that came out and differ from those rendered in any bit, and "
            "those rendered that did not come out", "sound_output", ("==", 0), full=True),
-    Figure("sound_output_share", "ratio", "most processor time of the callback's thread from one call to the next, over "
-           "the duration of a buffer", "sound_output", ("<=", 0.5), baseline="99th percentile", full=True),
+    Figure("sound_output_share", "ratio", "most processor time of the callback's thread from one call to the next, "
+           "over the duration of a buffer", "sound_output", ("<=", 0.5), baseline="99th percentile", full=True),
     Figure("sound_output_allocations", "count", "allocations in the callback", "sound_output", ("==", 0),
            baseline="in its thread, with those of RtAudio and libpulse", full=True),
     Figure("sound_latency_p50", "ms", "from a cut's state in the server until its first sample came out of the sink, "
