@@ -71,8 +71,8 @@ struct Options {
 // sounded_mono_ns is a sum. It begins with the start of the render() call that first used the state. The frames that
 // the synthesis looks ahead are added (64, 1.3 ms), and the way of the sound to the usual listener (0.6 or 1.5 ms; none
 // in mono). The output's latency is added: all buffers in front of the card,
-// full (4 x 256 frames, 21.3 ms). On PulseAudio this is an upper bound; the monitor of a null sink receives a frame up
-// to one buffer earlier.
+// full (4 x 256 frames, 21.3 ms). On PulseAudio this is an upper bound; the monitor of a null sink receives a frame 7
+// ms earlier (deploy/docs/sound.md).
 class StateLog {
  public:
   [[nodiscard]] Result<void> open(const std::filesystem::path& file) {

@@ -1,5 +1,7 @@
 // RtAudio 5.2 on PulseAudio. Its exceptions are caught here.
+#include <pthread.h>
 #include <rtaudio/RtAudio.h>
+#include <sched.h>
 
 #include <algorithm>
 #include <array>
@@ -14,6 +16,7 @@ namespace {
 
 constexpr unsigned kChannels = 2;
 constexpr unsigned kMaxFrames = 4096;
+constexpr int kPriority = 20;  // of the threads of the sound, if the system allows it
 
 // RtAudio's error callback carries no user data, so the flag must be static. Only one output is open at a time.
 std::atomic<bool> stream_failed{false};
@@ -24,6 +27,27 @@ tl::unexpected<Error> no_server(const std::string& what) {
   return failure(ErrorCode::unavailable,
                  "no sound server answers (" + what + "); start PulseAudio, or use --output none with --wav FILE");
 }
+
+// RtAudio raises the priority of its own thread only. A thread of libpulse carries the frames to the server, and has
+// the priority of the thread that opened the stream. Without permission nothing changes.
+class Raised {
+ public:
+  explicit Raised(int priority) noexcept {
+    const sched_param raised{.sched_priority = priority};
+    known_ = pthread_getschedparam(pthread_self(), &policy_, &before_) == 0 &&
+             pthread_setschedparam(pthread_self(), SCHED_RR, &raised) == 0;
+  }
+  ~Raised() {
+    if (known_) pthread_setschedparam(pthread_self(), policy_, &before_);
+  }
+  Raised(const Raised&) = delete;
+  Raised& operator=(const Raised&) = delete;
+
+ private:
+  int policy_ = SCHED_OTHER;
+  sched_param before_{};
+  bool known_ = false;
+};
 
 // RtAudio's view of the server. It lists the sources too, and numbers them together with the sinks.
 struct PulseDevices {
@@ -71,10 +95,11 @@ class PulseOutput final : public AudioOutput {
       RtAudio::StreamOptions options;
       options.numberOfBuffers = params_.buffers;  // 0 would let PulseAudio buffer 137 ms
       options.flags = RTAUDIO_SCHEDULE_REALTIME;
-      options.priority = 20;
+      options.priority = kPriority;
       options.streamName = "Osteon";
       unsigned frames = params_.frames;
       stream_failed = false;
+      const Raised raised(kPriority);
       audio_->openStream(&to, nullptr, RTAUDIO_FLOAT32, params_.rate_hz, &frames, &PulseOutput::callback, this,
                          &options, &on_error);
       if (!audio_->isStreamOpen() || stream_failed) return no_server("it refuses a stream");

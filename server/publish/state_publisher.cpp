@@ -84,19 +84,30 @@ void StatePublisher::show(const std::vector<SceneItem>& items, const std::vector
   changed_ = true;
 }
 
-void StatePublisher::publish(RoomSeq room_seq) {
+void StatePublisher::make_message(RoomSeq room_seq, Clock::time_point now) {
+  v1::WatchCuttingResponse response;
+  response.set_room_seq(room_seq.value);
+  for (const auto& [author, shown] : states_) *response.add_states() = wire::to_wire(shown.state);
+  newest_ = {serialised(response), scene_};
+  ++number_;
+  made_ = now;
+  changed_ = false;
+  due_ = true;
+}
+
+void StatePublisher::publish_soon(RoomSeq room_seq, Clock::time_point now) {
+  const MutexLock lock(states_mutex_);
+  if (!changed_ || now - made_ < kApart) return;
+  make_message(room_seq, now);
+  wake_.notify_one();
+}
+
+void StatePublisher::publish(RoomSeq room_seq, Clock::time_point now) {
   const MutexLock lock(states_mutex_);
   for (auto& [author, shown] : states_) shown.ticks_over += shown.over ? 1 : 0;
   if (std::erase_if(states_, [](const auto& entry) { return entry.second.ticks_over > kShowIdleTicks; }) > 0)
     changed_ = true;
-  if (std::exchange(changed_, false)) {
-    v1::WatchCuttingResponse response;
-    response.set_room_seq(room_seq.value);
-    for (const auto& [author, shown] : states_) *response.add_states() = wire::to_wire(shown.state);
-    newest_ = {serialised(response), scene_};
-    ++number_;
-    due_ = true;
-  }
+  if (changed_) make_message(room_seq, now);
   due_ = due_ || owed_;
   if (due_) wake_.notify_one();
 }

@@ -39,6 +39,9 @@ class StatePublisher {
   using Clock = std::chrono::steady_clock;
   // A tool whose session has ended is shown idle for this many ticks, so that every reader sees it stop.
   static constexpr std::uint64_t kShowIdleTicks = 1200;
+  // A state that comes so long after the newest message does not wait for the tick. So there are no more messages than
+  // ticks.
+  static constexpr std::chrono::nanoseconds kApart{1'000'000'000 / 120};
 
   StatePublisher();
   ~StatePublisher() { stop(); }
@@ -60,7 +63,9 @@ class StatePublisher {
   void session_over(AuthorId author);
   void show(const std::vector<SceneItem>& items, const std::vector<BodyId>& bodies);
   // [tick] Enqueues what has changed since the last call, and what is still owed to slower readers.
-  void publish(RoomSeq room_seq);
+  void publish(RoomSeq room_seq, Clock::time_point now = Clock::now());
+  // Enqueues what has changed, if nothing was enqueued for kApart. If not, the next publish() does it.
+  void publish_soon(RoomSeq room_seq, Clock::time_point now = Clock::now());
   [[nodiscard]] std::vector<Vec3> tool_tips_mm() const;  // of the tools that somebody holds
 
  private:
@@ -75,6 +80,7 @@ class StatePublisher {
     std::uint64_t enqueued = 0;  // the newest message in its queue
   };
   void run();
+  void make_message(RoomSeq room_seq, Clock::time_point now) OSTEON_REQUIRES(states_mutex_);
   void send(Clock::time_point now);
   static void enqueue(Stream& stream, std::uint64_t number, const ShownNow& shown, Clock::time_point now);
 
@@ -88,6 +94,7 @@ class StatePublisher {
   Bytes scene_ OSTEON_GUARDED_BY(states_mutex_) = std::make_shared<const std::string>();
   ShownNow newest_ OSTEON_GUARDED_BY(states_mutex_);           // nothing before the first message
   std::uint64_t number_ OSTEON_GUARDED_BY(states_mutex_) = 0;  // of the newest message, from 1
+  Clock::time_point made_ OSTEON_GUARDED_BY(states_mutex_);    // the newest message
   bool changed_ OSTEON_GUARDED_BY(states_mutex_) = false;      // since the newest message was made
   bool due_ OSTEON_GUARDED_BY(states_mutex_) = false;          // to be sent
   bool owed_ OSTEON_GUARDED_BY(states_mutex_) = false;         // a reader lacks the newest message and wants it later

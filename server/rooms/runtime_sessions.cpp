@@ -329,7 +329,11 @@ void RoomRuntime::leave(StateSubscriber& subscriber) {
   impl_->people.went(subscriber.author());
 }
 Presence& RoomRuntime::people() { return impl_->people; }
-void RoomRuntime::publish_state(CuttingState state) { impl_->board.update(std::move(state)); }
+void RoomRuntime::publish_state(CuttingState state) {
+  impl_->board.update(std::move(state));
+  // A driven room does nothing between its ticks.
+  if (!impl_->driven()) impl_->board.publish_soon(RoomSeq{impl_->room_seq});
+}
 void RoomRuntime::push_bone(AuthorId author, const MountLoad& push) {
   if (impl_->mount) impl_->mount->push(author, push);
 }

@@ -1,11 +1,16 @@
 """Figures of recorded sound, by the program osteon-audio."""
 import json
 import re
+import shutil
 import wave
+from pathlib import Path
 
 import numpy as np
 
 from registry import Measured
+
+# Runs a program beside a sound server without a card.
+NULL_SINK = Path(__file__).resolve().parents[3] / "deploy/with-null-sink"
 
 RATE_HZ, SECONDS = 48000, 30
 
@@ -106,5 +111,54 @@ def classes(run):
     return values
 
 
+def played(run, group, *arguments):
+    """What osteon-sound-output says; nothing without a sound server."""
+    if not shutil.which("pulseaudio"):
+        run.skip(group, "PulseAudio is not installed")
+        return None
+    return json.loads(run.output(NULL_SINK, run.programs / "osteon-sound-output", *arguments))
+
+
+GAPLESS_MINUTES, JUST_NOTICED_MS = 10, 24.0
+STAGES = (("arrived", "from the cut's state in the server until its sound comes out of the monitor"),
+          ("server_and_network", "of it until the client has the state"),
+          ("wait_for_render", "until a callback takes it"),
+          ("render_to_monitor", "from there until it comes out"),
+          ("played", "from the state until it would be played, by the clock of the sink"),
+          ("monitor_late", "what the monitor adds: how late its pieces come after the soonest one"))
+
+
+def gapless(run):
+    run.say(f"{GAPLESS_MINUTES} minutes of drilling, for gaps")
+    found = played(run, "sound_output", "gapless", GAPLESS_MINUTES, "--listen", "headphones")
+    if not found:
+        return {f"sound_output_{name}": Measured(None)
+                for name in ("compared", "gaps", "differing", "share", "allocations")}
+    run.tables.append(("output of the sound", [(name, found[name]) for name in sorted(found)]))
+    return {"sound_output_compared": Measured(found["seconds_equal"] / (60 * GAPLESS_MINUTES)),
+            "sound_output_gaps": Measured(found["gaps"], found["gaps_by_clock"]),
+            "sound_output_differing": Measured(found["differing_frames"] + found["missing_frames"]),
+            "sound_output_share": Measured(found["share_max"], found["share_p99"]),
+            "sound_output_allocations": Measured(found["allocations"], found["allocations_of_thread"])}
+
+
+def latency(run):
+    run.say("from cuts in a server to their sound")
+    found = played(run, "sound_latency", "latency", 300)
+    if not found:
+        return {f"sound_latency_{name}": Measured(None) for name in ("p50", "p95", "p99", "unheard")}
+    arrived, counts, bin_ms = found["arrived_ms"], found["histogram"]["counts"], found["histogram"]["bin_ms"]
+    run.tables.append(("from a cut to its sound, ms, and number of cuts",
+                       [(f"{bin_ms * i:g} to {bin_ms * (i + 1):g}", count) for i, count in enumerate(counts) if count]))
+    run.tables.append(("from a cut to its sound, ms", [("", "p50", "p95", "p99", "max")] +
+                       [(what, *(found[f"{name}_ms"][part] for part in ("p50", "p95", "p99", "max")))
+                        for name, what in STAGES]))
+    return {"sound_latency_p50": Measured(arrived["p50"]),
+            "sound_latency_p95": Measured(arrived["p95"] / JUST_NOTICED_MS, arrived["p95"]),
+            "sound_latency_p99": Measured(arrived["p99"], arrived["max"]),
+            "sound_latency_unheard": Measured(found["unheard"])}
+
+
 GROUPS = {"sound_analysis": analysis, "sound_binaural": binaural, "sound_model": models, "sound_classes": classes,
+          "sound_output": gapless, "sound_latency": latency,
           "tool_sound": tools}

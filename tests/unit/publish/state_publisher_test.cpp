@@ -69,5 +69,26 @@ TEST(StatePublisher, TheToolOfAnEndedSessionRests) {
   EXPECT_TRUE(publisher.tool_tips_mm().empty());
 }
 
+// A state that comes alone is sent at once. Of those that come closer together than ticks, the tick sends the newest.
+TEST(StatePublisher, AStateDoesNotWaitForTheTick) {
+  const StatePublisher::Clock::time_point begin{std::chrono::seconds{100}};
+  StatePublisher publisher;
+  const auto came = [&](std::uint64_t state_seq, std::chrono::nanoseconds after) {
+    CuttingState state;
+    state.author = AuthorId{7};
+    state.state_seq = state_seq;
+    publisher.update(state);
+    publisher.publish_soon(RoomSeq{1}, begin + after);
+    return shown_by(publisher).state_seq;
+  };
+  EXPECT_EQ(came(1, {}), 1U);
+  EXPECT_EQ(came(2, StatePublisher::kApart / 2), 1U);
+  EXPECT_EQ(came(3, StatePublisher::kApart * 3 / 4), 1U);
+  publisher.publish(RoomSeq{1}, begin + StatePublisher::kApart * 7 / 8);
+  EXPECT_EQ(shown_by(publisher).state_seq, 3U);
+  EXPECT_EQ(came(4, StatePublisher::kApart), 3U) << "the tick has just sent one";
+  EXPECT_EQ(came(5, 2 * StatePublisher::kApart), 5U);
+}
+
 }  // namespace
 }  // namespace osteon

@@ -1,0 +1,97 @@
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <thread>
+
+#include "audio_client/output/sound_engine.hpp"
+#include "tests/perf/percentiles.hpp"
+#include "tests/perf/sound_output/measured_source.hpp"
+#include "tests/perf/sound_output/monitor.hpp"
+#include "tests/perf/sound_output/output_trial.hpp"
+#include "tests/unit/audio_client/scripted_drilling.hpp"
+
+namespace osteon::test {
+namespace {
+
+using namespace std::chrono_literals;
+using Clock = std::chrono::steady_clock;
+
+constexpr double kHalf = 0.5;  // of a period, the most that the thread may work
+
+// A drilling that never rests, again and again. It moves round the listener, at 60 states a second as a haptic client
+// sends them.
+class DrillingHand {
+ public:
+  explicit DrillingHand(audio::SoundEngine& engine) : engine_(engine) {
+    for (const CuttingState& state : scripted_drilling().states)
+      if (state.spindle_rpm > 1000) states_.push_back(state);
+    thread_ = std::jthread([this](const std::stop_token& stop) { run(stop); });
+  }
+
+ private:
+  void run(const std::stop_token& stop) {
+    auto due = Clock::now();
+    for (std::uint64_t i = 0; !stop.stop_requested(); ++i) {
+      CuttingState state = states_[2 * i % states_.size()];
+      state.state_seq = i + 1;
+      state.time_ns = Clock::now().time_since_epoch().count();
+      const double turn = 0.02 * static_cast<double>(i);
+      state.pose_bone_tool.position_mm = Vec3(60 * std::cos(turn), 0, 60 * std::sin(turn));
+      engine_.deliver(audio::sound_scene({&state, 1}, state.time_ns));
+      std::this_thread::sleep_until(due += 16667us);
+    }
+  }
+
+  audio::SoundEngine& engine_;
+  std::vector<CuttingState> states_;
+  std::jthread thread_;
+};
+
+}  // namespace
+
+Result<nlohmann::json> play_without_gaps(const OutputTrial& trial) {
+  Result<audio::SynthParams> params = synth_of(trial);
+  if (!params) return tl::unexpected(params.error());
+  const auto most_frames = static_cast<std::size_t>((60 * trial.minutes + 60) * kOutputRate_hz);
+  audio::SoundEngine engine(*params);
+  MeasuredSource source(engine, most_frames);
+  const Result<std::unique_ptr<Monitor>> monitor = Monitor::open(kSink, most_frames);
+  if (!monitor) return tl::unexpected(monitor.error());
+  Result<std::unique_ptr<audio::AudioOutput>> output = audio::open_output(trial.output, source);
+  if (!output) return tl::unexpected(output.error());
+  if (Result<void> started = (*output)->start(); !started) return tl::unexpected(started.error());
+  {
+    const DrillingHand hand(engine);
+    std::this_thread::sleep_for(std::chrono::duration<double>(60 * trial.minutes));
+  }
+  (*output)->stop();
+  std::this_thread::sleep_for(500ms);
+
+  const FrameComparison heard = compare(source.frames(), (*monitor)->frames());
+  std::vector<double> shares = source.shares();
+  std::ranges::sort(shares);
+  const SinkFacts sink = (*monitor)->sink();
+  nlohmann::json found = described(trial);
+  found.update({{"sink_keeps_samples", sink.float_48k_stereo && sink.full_volume},
+                {"trouble", (*output)->failure_reason()},
+                {"seconds_equal", static_cast<double>(heard.equal) / kOutputRate_hz},
+                {"gaps", heard.gaps},
+                {"silent_frames", heard.silent},
+                {"jumps", heard.jumps},
+                {"missing_frames", heard.missing},
+                {"differing_frames", heard.differing},
+                {"monitor_holes", (*monitor)->holes()},
+                {"gaps_by_clock", (*output)->gaps()},
+                {"late_callbacks", (*output)->late_callbacks()},
+                {"realtime", source.is_realtime()},
+                {"callbacks", shares.size()},
+                {"share_p50", percentile(shares, 50)},
+                {"share_p99", percentile(shares, 99)},
+                {"share_max", percentile(shares, 100)},
+                {"above_half", std::ranges::count_if(shares, [](double share) { return share > kHalf; })},
+                {"allocations", source.allocations()},
+                {"allocations_of_thread", source.allocations_of_thread()}});
+  return found;
+}
+
+}  // namespace osteon::test
