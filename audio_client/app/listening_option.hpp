@@ -6,7 +6,7 @@
 #include "audio_client/space/sound_path.hpp"
 #include "common/core/result.hpp"
 
-namespace CLI {  // the library's
+namespace CLI {  // NOLINT(readability-identifier-naming): the library's
 class App;
 }
 

@@ -5,7 +5,7 @@
 
 #include "common/core/result.hpp"
 
-namespace CLI {  // the library's
+namespace CLI {  // NOLINT(readability-identifier-naming): the library's
 class App;
 }
 

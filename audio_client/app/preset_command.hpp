@@ -7,7 +7,7 @@
 #include "audio_client/presets/tool_model.hpp"
 #include "common/core/result.hpp"
 
-namespace CLI {  // the library's
+namespace CLI {  // NOLINT(readability-identifier-naming): the library's
 class App;
 }
 
