@@ -7,6 +7,7 @@
 #include "common/core/check.hpp"
 #include "common/mechanics/cutting_effects.hpp"
 #include "common/mechanics/milling.hpp"
+#include "common/tools/spread_points.hpp"
 
 namespace osteon::haptic {
 namespace {
@@ -79,8 +80,7 @@ std::vector<SamplePoint> points_of(const Tool& tool, int count) {
   if (!is_saw(tool.kind)) return points;
   std::erase_if(points, [](const SamplePoint& p) { return p.active; });
   const double forward_mm = tool.kind == ToolKind::reciprocating_saw ? 0.5 * tool.stroke_mm : 0.0;
-  for (SamplePoint p : sample_points(at_stroke_ends(tool), count)) {
-    if (!p.active) continue;
+  for (SamplePoint p : active_points(at_stroke_ends(tool), count)) {
     p.position_mm.z() += forward_mm;
     points.push_back(p);
   }
