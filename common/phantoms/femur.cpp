@@ -301,7 +301,8 @@ double Femur::neck_mm(const Vec3& at) const {
 double Femur::condyle_mm(const Condyle& condyle, const Vec3& at) const {
   const double half = 0.5 * p_.condyle_width_mm, inner = condyle.radius_mm - half;
   const double in_plane = round_cone_mm({0.0, at.y(), at.z()}, condyle.posterior, inner, condyle.anterior, inner);
-  return std::hypot(std::max(0.0, in_plane), at.x() - condyle.x) - half;
+  const double beyond = std::max(0.0, in_plane), beside = at.x() - condyle.x;
+  return std::sqrt(beyond * beyond + beside * beside) - half;
 }
 
 Vec3 Femur::epicondyle(const Condyle& condyle) const {

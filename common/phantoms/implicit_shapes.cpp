@@ -44,7 +44,9 @@ double round_cone_mm(const Vec3& at, const Vec3& a, double radius_a_mm, const Ve
 
 double ellipse_mm(double x, double y, double a, double b) {
   // k0 is 1 on the ellipse, and k1 / k0 is the length of its gradient.
-  const double k0 = std::hypot(x / a, y / b), k1 = std::hypot(x / (a * a), y / (b * b));
+  // std::hypot takes several times as long, and its last bit depends on the C library.
+  const auto length = [](double u, double v) { return std::sqrt(u * u + v * v); };
+  const double k0 = length(x / a, y / b), k1 = length(x / (a * a), y / (b * b));
   if (k1 < 1e-9) return -std::min(a, b);
   return k0 * (k0 - 1.0) / k1;
 }

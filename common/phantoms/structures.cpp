@@ -34,6 +34,42 @@ double clear_from(const Beside& beside, const Distance& bone_mm) {
   return t;
 }
 
+// Some successive segments of a line, in a box.
+struct LinePart {
+  std::size_t first = 0, end = 0;
+  Box box;
+};
+
+std::vector<LinePart> parts_of(const std::vector<Vec3>& line) {
+  constexpr std::size_t kSegments = 6;
+  std::vector<LinePart> parts;
+  for (std::size_t first = 0; first + 1 < line.size(); first += kSegments) {
+    LinePart part{first, std::min(first + kSegments, line.size() - 1), {}};
+    for (std::size_t i = part.first; i <= part.end; ++i) part.box.include(line[i]);
+    parts.push_back(part);
+  }
+  return parts;
+}
+
+double squared_distance_to_line(const Vec3& at, const std::vector<Vec3>& line, const std::vector<LinePart>& parts) {
+  const auto to_box = [&](const LinePart& part) {
+    return (at - at.cwiseMax(part.box.min_mm).cwiseMin(part.box.max_mm)).squaredNorm();
+  };
+  // What is beyond this part of a squared distance is not nearer, also after rounding.
+  constexpr double kSurely = 1.0 - 1e-9;
+  double squared = std::numeric_limits<double>::infinity();
+  const auto look = [&](const LinePart& part) {
+    for (std::size_t i = part.first; i < part.end; ++i)
+      squared = std::min(squared, squared_distance_to_segment<double>(at, line[i], line[i + 1]));
+  };
+  // The part whose box is nearest comes first, so that most others are too far.
+  const LinePart& nearest = *std::ranges::min_element(parts, {}, to_box);
+  look(nearest);
+  for (const LinePart& part : parts)
+    if (&part != &nearest && kSurely * to_box(part) < squared) look(part);
+  return squared;
+}
+
 // How fast a distance grows. In grooves it is slower than the Euclidean one.
 double slope_at(const Vec3& at, const Distance& distance_mm) {
   constexpr double kStep_mm = 0.01;
@@ -61,11 +97,8 @@ std::vector<double> windowed(const std::vector<double>& values, std::size_t reac
 Structure tube(const std::string& name, LabelKind kind, std::vector<Vec3> line, double radius_mm,
                const Distance& bone_mm) {
   Structure made{name, kind, kind == LabelKind::nerve ? kNerve_hu : kVessel_hu, box_around(line, radius_mm), {}, line};
-  made.distance_mm = [line = std::move(line), radius_mm, bone_mm](const Vec3& at) {
-    double squared = std::numeric_limits<double>::infinity();
-    for (std::size_t i = 0; i + 1 < line.size(); ++i)
-      squared = std::min(squared, squared_distance_to_segment<double>(at, line[i], line[i + 1]));
-    const double tube_mm = std::sqrt(squared) - radius_mm;
+  made.distance_mm = [line = std::move(line), parts = parts_of(made.line_mm), radius_mm, bone_mm](const Vec3& at) {
+    const double tube_mm = std::sqrt(squared_distance_to_line(at, line, parts)) - radius_mm;
     return tube_mm < 0.0 ? std::max(tube_mm, kOffBone_mm - bone_mm(at)) : tube_mm;
   };
   return made;

@@ -1,6 +1,7 @@
 #include "common/tools/implicit.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -152,13 +153,20 @@ Implicit convex(std::vector<HalfSpace> faces) {
   std::vector<std::vector<PolygonEdge>> edges;
   for (std::size_t i = 0; i < faces.size(); ++i) edges.push_back(edges_of(polygons[i], faces[i].normal));
   return {[faces = std::move(faces), edges = std::move(edges)](const Vec3& p) {
+            const auto height_of = [&](std::size_t i) { return faces[i].normal.dot(p) - faces[i].offset_mm; };
+            // Tools have no more faces than this. The heights over further ones are computed twice.
+            std::array<double, 32> heights;
             double inside = -kInfinity;
-            for (const HalfSpace& face : faces) inside = std::max(inside, face.normal.dot(p) - face.offset_mm);
+            for (std::size_t i = 0; i < faces.size(); ++i) {
+              const double height = height_of(i);
+              if (i < heights.size()) heights[i] = height;
+              inside = std::max(inside, height);
+            }
             if (inside <= 0.0) return inside;
             // The nearest point lies on a face that is visible from p.
             double nearest = kInfinity;
             for (std::size_t i = 0; i < faces.size(); ++i) {
-              const double height = faces[i].normal.dot(p) - faces[i].offset_mm;
+              const double height = i < heights.size() ? heights[i] : height_of(i);
               if (height <= 0.0 || height >= nearest || edges[i].empty()) continue;
               nearest = std::min(nearest, polygon_distance(edges[i], height, p));
             }

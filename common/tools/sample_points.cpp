@@ -1,6 +1,7 @@
 // The points that touch bone: rings on drills and round burs, and points spread over the surface of every other tool.
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <numbers>
 
 #include "common/core/check.hpp"
@@ -81,40 +82,65 @@ bool cuts_forwards_only(ToolKind kind) {
   return kind == ToolKind::end_drill || kind == ToolKind::pin || kind == ToolKind::screw;
 }
 
+// What decides which points of a tool cut.
+struct Cutting {
+  Tool tool;
+  Implicit solid, part;
+  explicit Cutting(const Tool& of) : tool(of), solid(tool_solid(of)), part(cutting_part(of)) {}
+  // Whether a point of the surface cuts.
+  [[nodiscard]] bool operator()(const Vec3& p, const Vec3& outward) const {
+    // The back face of a tool never cuts.
+    constexpr double kNear_mm = 0.01;
+    if (!tool.cuts() || part(p) > solid(p) + 1e-9 || p.z() < -tool.cutting_length_mm + kNear_mm) return false;
+    return !cuts_forwards_only(tool.kind) || (outward.z() > 0.1 && p.z() > -point_height_mm(tool) - kNear_mm);
+  }
+  // Cells of the surface well below the spacing of `count` points, but not finer than the tool needs.
+  [[nodiscard]] double cell_mm(int count) const {
+    const Vec3 size = part.bounds.size_mm();
+    const double face_mm2 = 2.0 * (size.x() * size.y() + size.y() * size.z() + size.z() * size.x());
+    return std::max(0.5 * std::sqrt(face_mm2 / std::max(1, count)), 0.25);
+  }
+};
+
+std::vector<SamplePoint> points_that_cut(const Cutting& cutting, const TriangleMesh& surface, int count) {
+  std::vector<SamplePoint> points = spread_points(cutting.solid, surface, std::cref(cutting), {.count = count});
+  OSTEON_CHECK(!points.empty());
+  for (SamplePoint& point : points) point.active = true;
+  return points;
+}
+
+bool has_rings(const Tool& tool) { return tool.kind == ToolKind::drill || tool.kind == ToolKind::round_burr; }
+
 }  // namespace
 
 std::vector<SamplePoint> sample_points(const Tool& tool, int count) {
-  if (tool.kind == ToolKind::drill || tool.kind == ToolKind::round_burr) return points_on_rings(tool, count);
-  const Implicit solid = tool_solid(tool), part = cutting_part(tool);
-  // Cells of the surface well below the spacing, but not finer than the tool needs.
-  const Vec3 size = part.bounds.size_mm();
-  const double face_mm2 = 2.0 * (size.x() * size.y() + size.y() * size.z() + size.z() * size.x());
-  const double coarse = std::max(0.5 * std::sqrt(face_mm2 / std::max(1, count)), 0.25);
-  const TriangleMesh surface = tool_surface(tool, coarse);
-  const double back_mm = -tool.cutting_length_mm, point_mm = -point_height_mm(tool);
-  const auto active = [&](const Vec3& p, const Vec3& outward) {
-    // The back face of a tool never cuts.
-    constexpr double kNear_mm = 0.01;
-    if (!tool.cuts() || part(p) > solid(p) + 1e-9 || p.z() < back_mm + kNear_mm) return false;
-    return !cuts_forwards_only(tool.kind) || (outward.z() > 0.1 && p.z() > point_mm - kNear_mm);
-  };
+  if (has_rings(tool)) return points_on_rings(tool, count);
+  const Cutting cutting(tool);
+  const TriangleMesh surface = tool_surface(tool, cutting.cell_mm(count));
   if (!tool.cuts()) {
     const auto all = [](const Vec3&, const Vec3&) { return true; };
-    return spread_points(solid, surface, all, {.count = count});
+    return spread_points(cutting.solid, surface, all, {.count = count});
   }
-  std::vector<SamplePoint> points = spread_points(solid, surface, active, {.count = count});
-  OSTEON_CHECK(!points.empty());
+  std::vector<SamplePoint> points = points_that_cut(cutting, surface, count);
   double active_mm2 = 0.0;
-  for (SamplePoint& point : points) {
-    point.active = true;
-    active_mm2 += point.area_mm2;
-  }
+  for (const SamplePoint& point : points) active_mm2 += point.area_mm2;
   // Walls only block, so they are sampled less densely than the cutting face.
   const double spacing = std::sqrt(active_mm2 / static_cast<double>(points.size()));
-  const auto passive = [&](const Vec3& p, const Vec3& outward) { return !active(p, outward); };
-  const auto walls =
-      spread_points(solid, surface, passive, {.spacing_mm = std::max(2.0 * spacing, tool.shank_diameter_mm / 3.0)});
+  const auto passive = [&](const Vec3& p, const Vec3& outward) { return !cutting(p, outward); };
+  const auto walls = spread_points(cutting.solid, surface, passive,
+                                   {.spacing_mm = std::max(2.0 * spacing, tool.shank_diameter_mm / 3.0)});
   points.insert(points.end(), walls.begin(), walls.end());
+  return points;
+}
+
+std::vector<SamplePoint> active_points(const Tool& tool, int count) {
+  OSTEON_CHECK(tool.cuts());
+  if (!has_rings(tool)) {
+    const Cutting cutting(tool);
+    return points_that_cut(cutting, cutting_surface(tool, cutting.cell_mm(count)), count);
+  }
+  std::vector<SamplePoint> points = points_on_rings(tool, count);
+  std::erase_if(points, [](const SamplePoint& point) { return !point.active; });
   return points;
 }
 

@@ -25,4 +25,8 @@ struct Spread {
     const Implicit& solid, const TriangleMesh& surface,
     const std::function<bool(const Vec3& p, const Vec3& outward)>& belongs, const Spread& spread);
 
+// Those of sample_points(tool, count) that are active, in their order. A long tool takes a fraction of the time. The
+// tool cuts.
+[[nodiscard]] std::vector<SamplePoint> active_points(const Tool& tool, int count);
+
 }  // namespace osteon

@@ -6,10 +6,11 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <unordered_map>
+#include <memory>
 #include <vector>
 
 #include "common/core/check.hpp"
+#include "common/geometry/coord_map.hpp"
 #include "common/tools/tool_solid.hpp"
 
 namespace osteon {
@@ -19,12 +20,30 @@ namespace {
 constexpr double kInside_mm = 1e-7;
 // An edge or corner whose planes differ by less than this fraction counts as smooth (relative eigenvalue).
 constexpr double kFlat = 0.02;
+constexpr double kEverywhere_mm = 1e12;
 
-// Corner values of the cells near the surface, found by bisecting a box. With a 1-Lipschitz distance, a box is skipped
-// if the distance at its middle exceeds half its diagonal.
+// A cell's edge or vertex that has none.
+constexpr std::uint32_t kNone = ~0u;
+constexpr int kBlockShift = 3, kBlockCells = 1 << kBlockShift;
+
+// What is known at the lower corners of 8³ cells: neighbours are read together, so they lie together.
+struct CellBlock {
+  static constexpr std::size_t kCount = kBlockCells * kBlockCells * kBlockCells;
+  std::array<double, kCount> distance;                        // NaN: not computed yet
+  std::array<std::array<std::uint32_t, kCount>, 3> crossing;  // of the surface with the edge along each axis
+  std::array<std::uint32_t, kCount> vertex;                   // in this cell
+  CellBlock() {
+    distance.fill(std::numeric_limits<double>::quiet_NaN());
+    for (auto& along : crossing) along.fill(kNone);
+    vertex.fill(kNone);
+  }
+};
+
+// The cells near the surface, found by bisecting a box. With a 1-Lipschitz distance, a box is skipped if the distance
+// at its middle exceeds half its diagonal.
 class Grid {
  public:
-  Grid(const Implicit& solid, double cell_mm) : solid_(solid), cell_(cell_mm) {
+  Grid(const Implicit& solid, double cell_mm, const std::optional<Box>& within) : solid_(solid), cell_(cell_mm) {
     // Shifted from the origin by an irrational fraction, so that faces of a tool do not lie in the grid's planes.
     origin_ = solid.bounds.min_mm - Vec3(1.317, 1.271, 1.413) * cell_mm;
     const Vec3 size = solid.bounds.max_mm - origin_;
@@ -34,17 +53,20 @@ class Grid {
     while (span < largest) span *= 2;
     limit_ = Coord{static_cast<std::int32_t>(size.x() / cell_mm) + 2, static_cast<std::int32_t>(size.y() / cell_mm) + 2,
                    static_cast<std::int32_t>(size.z() / cell_mm) + 2};
+    if (within) wanted_ = *within;
     halve({0, 0, 0}, span);
-    values_.reserve(2 * cells_.size());
   }
 
   [[nodiscard]] const std::vector<Coord>& cells() const { return cells_; }
   [[nodiscard]] Vec3 place(Coord c) const { return origin_ + cell_ * Vec3(c.x, c.y, c.z); }
   double value(Coord c) {
-    const auto [found, fresh] = values_.try_emplace(c, 0.0);
-    if (fresh) found->second = solid_(place(c)) - kInside_mm;
-    return found->second;
+    double& value = block(c).distance[within_block(c)];
+    if (std::isnan(value)) value = solid_(place(c)) - kInside_mm;
+    return value;
   }
+  // Of the cell with this lower corner: the number of the crossing along an axis, and of the vertex.
+  std::uint32_t& crossing_at(Coord c, std::size_t axis) { return block(c).crossing[axis][within_block(c)]; }
+  std::uint32_t& vertex_at(Coord c) { return block(c).vertex[within_block(c)]; }
   bool inside(Coord c) { return value(c) < 0.0; }
   [[nodiscard]] double cell_mm() const { return cell_; }
 
@@ -73,7 +95,9 @@ class Grid {
   void halve(Coord at, int span) {
     if (at.x > limit_.x || at.y > limit_.y || at.z > limit_.z) return;
     const double half = 0.5 * span * cell_;
-    if (std::abs(solid_(place(at) + Vec3::Constant(half))) > 1.7321 * half + 1e-6) return;
+    const Vec3 middle = place(at) + Vec3::Constant(half);
+    if (((middle - wanted_.max_mm).array() > half).any() || ((wanted_.min_mm - middle).array() > half).any()) return;
+    if (std::abs(solid_(middle)) > 1.7321 * half + 1e-6) return;
     if (span == 1) {
       cells_.push_back(at);
       return;
@@ -82,12 +106,29 @@ class Grid {
     for (int i = 0; i < 8; ++i) halve(at + Coord{(i >> 2) * next, ((i >> 1) & 1) * next, (i & 1) * next}, next);
   }
 
+  static std::size_t within_block(Coord c) {
+    const auto along = [](std::int32_t at) { return static_cast<std::size_t>(at & (kBlockCells - 1)); };
+    return (along(c.x) * kBlockCells + along(c.y)) * kBlockCells + along(c.z);
+  }
+  CellBlock& block(Coord c) {
+    const Coord index = shift_down(c, kBlockShift);
+    if (last_ && index == last_index_) return *last_;
+    std::unique_ptr<CellBlock>& found = blocks_[index];
+    if (!found) found = std::make_unique<CellBlock>();
+    last_index_ = index;
+    last_ = found.get();
+    return *last_;
+  }
+
   const Implicit& solid_;
   double cell_;
   Vec3 origin_;
   Coord limit_;
+  Box wanted_{Vec3::Constant(-kEverywhere_mm), Vec3::Constant(kEverywhere_mm)};
   std::vector<Coord> cells_;
-  std::unordered_map<Coord, double, CoordHash> values_;
+  CoordMap<std::unique_ptr<CellBlock>> blocks_;
+  Coord last_index_;
+  CellBlock* last_ = nullptr;
 };
 
 constexpr std::array<Coord, 3> kSteps{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
@@ -124,16 +165,13 @@ Vec3 feature(const std::vector<Vec3>& points, const std::vector<Vec3>& normals) 
 
 }  // namespace
 
-TriangleMesh surface_of(const Implicit& solid, double cell_mm) {
+TriangleMesh surface_of(const Implicit& solid, double cell_mm, const std::optional<Box>& within) {
   OSTEON_CHECK(cell_mm > 0.0);
-  Grid grid(solid, cell_mm);
+  Grid grid(solid, cell_mm, within);
   struct Crossing {
     Vec3 point, normal;
   };
-  // By the edge's lower corner and its axis.
-  std::array<std::unordered_map<Coord, Crossing, CoordHash>, 3> crossings;
-  std::unordered_map<Coord, std::uint32_t, CoordHash> vertex_of;
-  vertex_of.reserve(grid.cells().size());
+  std::vector<Crossing> crossings;
   std::vector<Coord> crossed;
   TriangleMesh mesh;
   std::vector<Vec3> points, normals;
@@ -149,13 +187,14 @@ TriangleMesh surface_of(const Implicit& solid, double cell_mm) {
       for (const std::size_t from : {std::size_t{0}, u, v, u + v}) {
         if (inside[from] == inside[from + along]) continue;
         const Coord at = cell + corner_of_cell(from);
-        const auto [found, fresh] = crossings[k].try_emplace(at);
-        if (fresh) {
+        if (grid.crossing_at(at, k) == kNone) {
           const Vec3 p = grid.crossing(at, at + kSteps[k]);
-          found->second = {p, gradient(solid, p)};
+          grid.crossing_at(at, k) = static_cast<std::uint32_t>(crossings.size());
+          crossings.push_back({p, gradient(solid, p)});
         }
-        points.push_back(found->second.point);
-        normals.push_back(found->second.normal);
+        const Crossing& crossing = crossings[grid.crossing_at(at, k)];
+        points.push_back(crossing.point);
+        normals.push_back(crossing.normal);
       }
     }
     // A vertex outside its cell could fold the surface over.
@@ -164,20 +203,20 @@ TriangleMesh surface_of(const Implicit& solid, double cell_mm) {
     // On a curved face the planes meet beside the surface, so the point is projected onto it again.
     if (const double off = solid(p); std::abs(off) > 1e-4 * cell_mm)
       p = (p - off * gradient(solid, p)).cwiseMax(low).cwiseMin(high);
-    vertex_of.emplace(cell, static_cast<std::uint32_t>(mesh.positions_mm.size()));
+    grid.vertex_at(cell) = static_cast<std::uint32_t>(mesh.positions_mm.size());
     mesh.positions_mm.push_back({static_cast<float>(p.x()), static_cast<float>(p.y()), static_cast<float>(p.z())});
   }
   // Each crossed edge joins the vertices of its four cells, in the order of the cells, so that files are reproducible.
   for (const Coord& cell : crossed)
     for (std::size_t k = 0; k < 3; ++k) {
-      if (!crossings[k].contains(cell)) continue;
+      if (grid.crossing_at(cell, k) == kNone) continue;
       const Coord u = kSteps[(k + 1) % 3], v = kSteps[(k + 2) % 3];
       const std::array<Coord, 4> around{cell - u - v, cell - v, cell, cell - u};
       std::array<std::uint32_t, 4> corner{};
-      for (std::size_t i = 0; i < 4; ++i) {
-        const auto found = vertex_of.find(around[i]);
-        OSTEON_CHECK(found != vertex_of.end());
-        corner[i] = found->second;
+      for (std::size_t i = 0; i < 4; ++i) corner[i] = grid.vertex_at(around[i]);
+      if (std::ranges::find(corner, kNone) != corner.end()) {
+        OSTEON_CHECK(within);  // only the edge of the box may cut cells off
+        continue;
       }
       if (!grid.inside(cell)) std::swap(corner[1], corner[3]);
       // Along the shorter diagonal.
@@ -244,6 +283,12 @@ double thinnest_cell_mm(const Tool& tool) {
 
 TriangleMesh tool_surface(const Tool& tool, double resolution_mm) {
   return surface_of(tool_solid(tool), std::min(resolution_mm, thinnest_cell_mm(tool)));
+}
+
+TriangleMesh cutting_surface(const Tool& tool, double resolution_mm) {
+  const double cell_mm = std::min(resolution_mm, thinnest_cell_mm(tool));
+  // A triangle and its neighbours' vertices lie in cells beside it.
+  return surface_of(tool_solid(tool), cell_mm, cutting_part(tool).bounds.grown(4.0 * cell_mm));
 }
 
 }  // namespace osteon

@@ -38,7 +38,7 @@ class BrickGrid {
  private:
   double pitch_mm_ = 0;
   Coord first_, dims_;
-  std::vector<std::shared_ptr<const Brick>> bricks_;
+  std::vector<std::shared_ptr<const Brick>> bricks_;  // that were set
   std::vector<const float*> tables_;
 };
 

@@ -121,12 +121,33 @@ std::shared_ptr<const Brick> PatchBuilder::metal_brick(const Case& bone, Coord i
 void PatchBuilder::find_near(const ToolModel& model, const Pose& pose_tool_bone, const CoordBox& bricks,
                              double pitch_mm, double margin_mm) {
   near_.clear();
-  const double half_diagonal_mm = 0.5 * std::sqrt(3.0) * kBrickCells * pitch_mm;
-  for_each(bricks, [&](Coord index) {
-    const double distance_mm = model.solid(pose_tool_bone.point(brick_centre_mm(index, pitch_mm)));
-    if (distance_mm < margin_mm + half_diagonal_mm && distance_mm > -half_diagonal_mm - model.fine_pitch_mm)
-      near_.push_back(index);
-  });
+  const double edge_mm = kBrickCells * pitch_mm, half_diagonal_mm = 0.5 * std::sqrt(3.0) * edge_mm;
+  // Between samples of a distance, trilinear values may be that much steeper than the distance.
+  const double steepest = model.tool.kind == ToolKind::mesh ? std::sqrt(3.0) : 1.0;
+  // A box of bricks is halved, unless none of its bricks is near by the distance of its middle.
+  const auto halve = [&](const CoordBox& box, const auto& again) -> void {
+    const Coord dims = box.dims(), across = box.min + box.max + Coord{1, 1, 1};
+    const Vec3 middle_mm = 0.5 * edge_mm * Vec3(across.x, across.y, across.z);
+    const double most_mm = 0.5 * edge_mm * steepest * Vec3(dims.x - 1, dims.y - 1, dims.z - 1).norm();
+    const double distance_mm = model.solid(pose_tool_bone.point(middle_mm));
+    if (distance_mm - most_mm >= margin_mm + half_diagonal_mm ||
+        distance_mm + most_mm <= -half_diagonal_mm - model.fine_pitch_mm)
+      return;
+    if (dims == Coord{1, 1, 1}) {
+      near_.push_back(box.min);
+      return;
+    }
+    const auto longest = std::max({dims.x, dims.y, dims.z});
+    CoordBox low = box, high = box;
+    const auto part = [&](std::int32_t Coord::*axis) {
+      low.max.*axis = box.min.*axis + longest / 2 - 1;
+      high.min.*axis = box.min.*axis + longest / 2;
+    };
+    part(dims.x == longest ? &Coord::x : dims.y == longest ? &Coord::y : &Coord::z);
+    again(low, again);
+    again(high, again);
+  };
+  if (!bricks.empty()) halve(bricks, halve);
 }
 
 void PatchBuilder::build(std::span<const CutField* const> bodies, const ToolModel& model, const Pose& pose,

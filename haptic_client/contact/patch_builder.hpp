@@ -3,9 +3,9 @@
 #pragma once
 #include <memory>
 #include <span>
-#include <unordered_map>
 #include <vector>
 
+#include "common/geometry/coord_map.hpp"
 #include "common/volume/cut_field.hpp"
 #include "haptic_client/contact/patch.hpp"
 #include "haptic_client/contact/tool_model.hpp"
@@ -35,7 +35,7 @@ class PatchBuilder {
   [[nodiscard]] std::size_t bricks_made() const { return bricks_made_; }
 
  private:
-  using Store = std::unordered_map<Coord, std::shared_ptr<const Brick>, CoordHash>;
+  using Store = CoordMap<std::shared_ptr<const Brick>>;
   enum class Quantity { solid, density };
   // Fills near_ with the bricks whose centre is at most the margin and half their diagonal from the tool's surface, and
   // not deep inside the tool.

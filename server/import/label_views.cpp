@@ -172,7 +172,13 @@ class Surface {
     double before = begin;
     for (double depth = begin; depth <= end; before = depth, depth += step_mm) {
       const Vec3 at = start + depth * along;
-      if (!is_near(at) || filled(at) < 0.5) continue;
+      if (!is_near(at)) {
+        // The steps that stay in this brick meet nothing either.
+        const double out_mm = way_out_mm(start, along, at);
+        for (double next = depth + step_mm; next < out_mm; next += step_mm) depth = next;
+        continue;
+      }
+      if (filled(at) < 0.5) continue;
       const Vec3 surface = start + edge(start, along, before, depth) * along;
       const std::uint8_t label = label_at(surface - Vec3::Constant(kMaskBorder) + first);
       return Hit{depth, label, mixed(kBlackInk, *colours_[label], light(surface, lamp))};
@@ -192,6 +198,17 @@ class Surface {
   [[nodiscard]] bool is_near(const Vec3& at) const {
     return near_.at(static_cast<int>(at.x()) / kBrick, static_cast<int>(at.y()) / kBrick,
                     static_cast<int>(at.z()) / kBrick) != 0;
+  }
+  // How far along a line, in mm, the brick of one of its points ends.
+  [[nodiscard]] static double way_out_mm(const Vec3& start, const Vec3& along, const Vec3& at) {
+    constexpr double kShort_mm = 1e-6;  // rounding must not lead beyond it
+    double out = std::numeric_limits<double>::infinity();
+    for (int axis = 0; axis < 3; ++axis) {
+      if (std::abs(along[axis]) < 1e-12) continue;
+      const int brick = static_cast<int>(at[axis]) / kBrick + (along[axis] > 0.0 ? 1 : 0);
+      out = std::min(out, (brick * kBrick - start[axis]) / along[axis]);
+    }
+    return out - kShort_mm;
   }
   // How much of the interpolated voxel has a colour, 0 to 1. The border keeps all eight voxels within the mask.
   [[nodiscard]] double filled(const Vec3& at) const {

@@ -103,6 +103,25 @@ TEST(SamplePoints, StandForTheWholeCuttingFace) {
   EXPECT_NEAR(end, pi * 4.75 * 4.75, 0.02 * pi * 4.75 * 4.75);
 }
 
+// Two roads to the same points: on the whole surface, and on that of the cutting part alone.
+TEST(SamplePoints, OfTheCuttingPartAloneAreThoseOfTheWholeTool) {
+  for (const char* name :
+       {"saw-oscillating-3", "saw-reciprocating", "end-drill", "screw-1", "broach-2", "reamer-outside", "drill-3.2"}) {
+    SCOPED_TRACE(name);
+    const Tool tool = *find_tool(name);
+    std::vector<SamplePoint> expected = sample_points(tool, 200);
+    std::erase_if(expected, [](const SamplePoint& point) { return !point.active; });
+    const std::vector<SamplePoint> points = active_points(tool, 200);
+    ASSERT_EQ(points.size(), expected.size());
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      EXPECT_EQ(points[i].position_mm, expected[i].position_mm);
+      EXPECT_EQ(points[i].inward, expected[i].inward);
+      EXPECT_EQ(points[i].area_mm2, expected[i].area_mm2);
+      EXPECT_TRUE(points[i].active);
+    }
+  }
+}
+
 const auto everywhere = [](const Vec3&, const Vec3&) { return true; };
 
 TEST(SpreadPoints, AreasAddUpToTheSurfaceOfSphereCylinderAndBox) {
