@@ -32,7 +32,7 @@ struct WavWriter::Impl {
   Unfinished unfinished = Unfinished::removed;
   SNDFILE* out = nullptr;
   std::uint64_t frames = 0;
-  std::error_code why;  // of the first error
+  std::error_code first_error;
   bool failed = false, left = false;
 
   ~Impl() {
@@ -48,7 +48,7 @@ struct WavWriter::Impl {
   }
   [[nodiscard]] tl::unexpected<Error> not_written(const std::error_code& why) {
     failed = true;
-    this->why = why;
+    first_error = why;
     // close() still decides what becomes of a sound that is kept.
     const bool kept = unfinished == Unfinished::kept;
     return failure(ErrorCode::internal, not_whole(why) + (kept ? "" : kAsItWas));
@@ -68,7 +68,7 @@ Result<void> WavWriter::Impl::end() {
   const std::error_code now = reason();
   const bool closed = sf_close(std::exchange(out, nullptr)) == 0;
   const bool whole = !failed || unfinished == Unfinished::kept;
-  if (!header || !closed || !whole) return not_closed(failed ? why : now);
+  if (!header || !closed || !whole) return not_closed(failed ? first_error : now);
   return {};
 }
 
@@ -109,7 +109,7 @@ Result<void> WavWriter::write(std::span<const float> samples) {
   const std::uint64_t count = samples.size() / channels;
   const auto frame_bytes = static_cast<std::uint64_t>(impl_->format.channels * impl_->format.bits / 8);
   // Behind the sample that the disk did not take whole, others would be misplaced.
-  if (impl_->failed) return impl_->not_written(impl_->why);
+  if (impl_->failed) return impl_->not_written(impl_->first_error);
   if ((impl_->frames + count) * frame_bytes > kMostBytes)
     return failure(ErrorCode::exhausted,
                    "the sound " + impl_->file.string() + " is full, because a WAV file holds 4 GB; begin another file");
