@@ -19,7 +19,9 @@ std::span<const Frame> from_first_sound(std::span<const Frame> frames) {
 
 FrameComparison compare(std::span<const Frame> rendered, std::span<const Frame> heard) {
   rendered = from_first_sound(rendered);
+  const std::size_t all = heard.size();
   heard = from_first_sound(heard);
+  const std::size_t before = all - heard.size();
   FrameComparison found;
   bool in_gap = false;
   std::size_t r = 0;
@@ -31,7 +33,7 @@ FrameComparison compare(std::span<const Frame> rendered, std::span<const Frame> 
       continue;
     }
     if (heard[h].silent()) {
-      found.gaps += in_gap ? 0 : 1;
+      if (!in_gap) found.gaps.push_back(before + h);
       ++found.silent;
       in_gap = true;
       continue;

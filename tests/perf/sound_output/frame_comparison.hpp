@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <vector>
 
 namespace osteon::test {
 
@@ -18,8 +19,9 @@ struct Frame {
 
 // Frames, unless it is said otherwise.
 struct FrameComparison {
-  std::uint64_t equal = 0;      // bit by bit what was rendered, in its order
-  std::uint64_t gaps = 0;       // number of runs of silence that nobody rendered
+  std::uint64_t equal = 0;  // bit by bit what was rendered, in its order
+  // Runs of silence that nobody rendered: where they begin, among all frames that were heard.
+  std::vector<std::size_t> gaps;
   std::uint64_t silent = 0;     // in these gaps
   std::uint64_t jumps = 0;      // number of places at which rendered frames are missing
   std::uint64_t missing = 0;    // there

@@ -1,10 +1,13 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <optional>
 #include <thread>
+#include <vector>
 
 #include "audio_client/output/sound_engine.hpp"
 #include "tests/perf/percentiles.hpp"
+#include "tests/perf/sound_output/machine_watch.hpp"
 #include "tests/perf/sound_output/measured_source.hpp"
 #include "tests/perf/sound_output/monitor.hpp"
 #include "tests/perf/sound_output/output_trial.hpp"
@@ -47,6 +50,22 @@ class DrillingHand {
   std::jthread thread_;
 };
 
+// Gaps for which no processor's stall is to blame. A gap is heard soon after the stall that made it.
+std::size_t unexplained(const FrameComparison& heard, const Monitor& monitor, const std::vector<Stall>& stalls) {
+  constexpr std::int64_t kSoon_ns = 60'000'000;
+  return static_cast<std::size_t>(std::ranges::count_if(heard.gaps, [&](std::size_t frame) {
+    const std::int64_t at_ns = monitor.arrival_ns(frame);
+    return std::ranges::none_of(
+        stalls, [&](const Stall& stall) { return stall.from_ns <= at_ns && at_ns < stall.to_ns + kSoon_ns; });
+  }));
+}
+
+double longest_ms(const std::vector<Stall>& stalls) {
+  double longest = 0;
+  for (const Stall& stall : stalls) longest = std::max(longest, stall.ms());
+  return longest;
+}
+
 }  // namespace
 
 Result<nlohmann::json> play_without_gaps(const OutputTrial& trial) {
@@ -59,6 +78,9 @@ Result<nlohmann::json> play_without_gaps(const OutputTrial& trial) {
   if (!monitor) return tl::unexpected(monitor.error());
   Result<std::unique_ptr<audio::AudioOutput>> output = audio::open_output(trial.output, source);
   if (!output) return tl::unexpected(output.error());
+  std::optional<AwakeMachine> awake;
+  if (trial.awake) awake.emplace();
+  MachineWatch machine;
   if (Result<void> started = (*output)->start(); !started) return tl::unexpected(started.error());
   {
     const DrillingHand hand(engine);
@@ -66,6 +88,8 @@ Result<nlohmann::json> play_without_gaps(const OutputTrial& trial) {
   }
   (*output)->stop();
   std::this_thread::sleep_for(500ms);
+  const std::vector<Stall> stalls = machine.stop();
+  const double stolen_s = machine.stolen_s();
 
   const FrameComparison heard = compare(source.frames(), (*monitor)->frames());
   std::vector<double> shares = source.shares();
@@ -75,7 +99,11 @@ Result<nlohmann::json> play_without_gaps(const OutputTrial& trial) {
   found.update({{"sink_keeps_samples", sink.float_48k_stereo && sink.full_volume},
                 {"trouble", (*output)->failure_reason()},
                 {"seconds_equal", static_cast<double>(heard.equal) / kOutputRate_hz},
-                {"gaps", heard.gaps},
+                {"gaps", heard.gaps.size()},
+                {"gaps_without_stall", unexplained(heard, **monitor, stalls)},
+                {"stalls", stalls.size()},
+                {"longest_stall_ms", longest_ms(stalls)},
+                {"stolen_s", stolen_s},
                 {"silent_frames", heard.silent},
                 {"jumps", heard.jumps},
                 {"missing_frames", heard.missing},

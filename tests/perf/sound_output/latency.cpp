@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <chrono>
 #include <map>
+#include <optional>
 #include <random>
 #include <thread>
 #include <tuple>
@@ -11,6 +12,7 @@
 #include "common/wire/room_client.hpp"
 #include "server/rpc/room_server.hpp"
 #include "tests/perf/percentiles.hpp"
+#include "tests/perf/sound_output/machine_watch.hpp"
 #include "tests/perf/sound_output/monitor.hpp"
 #include "tests/perf/sound_output/output_trial.hpp"
 #include "tests/support/scenes/bones.hpp"
@@ -205,6 +207,8 @@ Result<nlohmann::json> time_cuts(const OutputTrial& trial) {
   if (!monitor) return tl::unexpected(monitor.error());
   auto listener = Listener::start(trial, (*server)->address());
   if (!listener) return tl::unexpected(listener.error());
+  std::optional<AwakeMachine> awake;
+  if (trial.awake) awake.emplace();
   CuttingHand hand(runtime, *author);
   std::jthread notes([&](const std::stop_token& stop) {
     while (!stop.stop_requested()) {

@@ -23,7 +23,10 @@ Result<audio::SynthParams> synth_of(const OutputTrial& trial) {
 }
 
 nlohmann::json described(const OutputTrial& trial) {
-  return {{"listen", trial.listen}, {"frames", trial.output.frames}, {"buffers", trial.output.buffers}};
+  return {{"listen", trial.listen},
+          {"frames", trial.output.frames},
+          {"buffers", trial.output.buffers},
+          {"awake", trial.awake}};
 }
 
 }  // namespace osteon::test

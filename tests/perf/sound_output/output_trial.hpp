@@ -18,6 +18,7 @@ inline constexpr const char* kSink = "virt";  // of deploy/with-null-sink
 struct OutputTrial {
   std::string listen = "loudspeakers";
   audio::OutputParams output;  // as osteon-audio has it, unless it is said otherwise
+  bool awake = false;          // keeps the processors from sleeping
   double minutes = 10;
   std::size_t cuts = 300;
 };

@@ -23,6 +23,8 @@ int main(int argc, char** argv) {
   for (CLI::App* command : {gapless, latency}) {
     command->add_option("--listen", trial.listen, "loudspeakers, headphones or mono")->capture_default_str();
     command->add_option("--frames", trial.output.frames, "In a buffer")->check(CLI::Range(32, 4096));
+    command->add_flag("--awake", trial.awake,
+                      "Keep the processors from sleeping, by threads that give way to all others");
     command->add_option("--buffers", trial.output.buffers)->check(CLI::Range(2, 64));
   }
   if (const auto code = parse_arguments(app, argc, argv)) return *code;
