@@ -116,7 +116,7 @@ def played(run, group, *arguments):
     if not shutil.which("pulseaudio"):
         run.skip(group, "PulseAudio is not installed")
         return None
-    return json.loads(run.output(NULL_SINK, run.programs / "osteon-sound-output", *arguments, "--awake"))
+    return json.loads(run.output(NULL_SINK, run.programs / "osteon-sound-output", *arguments))
 
 
 GAPLESS_MINUTES, JUST_NOTICED_MS = 10, 24.0
@@ -130,7 +130,7 @@ STAGES = (("arrived", "from the cut's state in the server until its sound comes 
 
 def gapless(run):
     run.say(f"{GAPLESS_MINUTES} minutes of drilling, for gaps")
-    found = played(run, "sound_output", "gapless", GAPLESS_MINUTES, "--listen", "headphones")
+    found = played(run, "sound_output", "gapless", GAPLESS_MINUTES, "--listen", "headphones", "--awake")
     if not found:
         return {f"sound_output_{name}": Measured(None)
                 for name in ("compared", "gaps", "differing", "share", "allocations")}
