@@ -150,7 +150,7 @@ FIGURES = [
     Figure("sound_output_compared", "ratio", "of ten minutes of a drilling over headphones, the part that was compared",
            "sound_output", (">=", 0.99), full=True),
     Figure("sound_output_gaps", "count", "runs of silence in what came out of the sink that nobody rendered",
-           "sound_output", ("==", 0), baseline="gaps by the output's own clock", full=True),
+           "sound_output", ("==", 0), baseline="those that followed no stall of the machine", full=True),
     Figure("sound_output_differing", "count", "frames that came out and differ from those rendered in any bit, and "
            "those rendered that did not come out", "sound_output", ("==", 0), full=True),
     Figure("sound_output_share", "ratio", "most processor time of the callback's thread from one call to the next, "
