@@ -29,12 +29,8 @@ class DisabledParts : public test::WindowBench {
     QSettings().setValue("tour/seen", true);
     WindowBench::SetUp();
   }
-};
-
-// Where nothing can be done yet, the pointer finds the reason.
-TEST_F(DisabledParts, SayWhyInTheirToolTips) {
-  const std::string reason = "Open a bone or join a room first.";
-  const auto tip_at = [&](QWidget& widget, const QPoint& at) {
+  // The tool tip that the pointer finds there.
+  static std::string tip_at(QWidget& widget, const QPoint& at) {
     QToolTip::hideText();
     EXPECT_TRUE(until([] { return !QToolTip::isVisible(); }, 5s)) << "the tip of before stays";
     QWidget* window = widget.window();
@@ -42,36 +38,45 @@ TEST_F(DisabledParts, SayWhyInTheirToolTips) {
     QTest::mouseMove(window->windowHandle(), widget.mapTo(window, at));
     EXPECT_TRUE(until([] { return QToolTip::isVisible(); }, 5s));
     return QToolTip::text().toStdString();
-  };
+  }
+  static constexpr const char* kNoRoom = "Open a bone or join a room first.";
+};
+
+// Where nothing can be done yet, the pointer finds the reason.
+TEST_F(DisabledParts, SayWhyInTheirToolTips) {
   auto* drill = window_->findChild<QToolButton*>("drill");
   auto* panel = window_->findChild<QDockWidget*>("tool_panel");
   auto* edit = window_->findChild<QAction*>("undo")->associatedWidgets().value(0);
   ASSERT_NE(qobject_cast<QMenu*>(edit), nullptr);
   EXPECT_FALSE(drill->isEnabled());
-  EXPECT_EQ(tip_at(*drill, drill->rect().center()), reason);
-  EXPECT_EQ(tip_at(*panel, QPoint(20, 8)), reason) << "its title";
-  EXPECT_EQ(tip_at(*window_->findChild<QLabel*>("force_bone"), QPoint(2, 2)), reason) << "a part of another panel";
+  EXPECT_EQ(tip_at(*drill, drill->rect().center()), kNoRoom);
+  EXPECT_EQ(tip_at(*panel, QPoint(20, 8)), kNoRoom) << "its title";
+  EXPECT_EQ(tip_at(*window_->findChild<QLabel*>("force_bone"), QPoint(2, 2)), kNoRoom) << "a part of another panel";
   static_cast<QMenu*>(edit)->popup(window_->mapToGlobal(QPoint(200, 200)));
   ASSERT_TRUE(QTest::qWaitForWindowExposed(edit));
-  const QAction* undo = window_->findChild<QAction*>("undo");
   EXPECT_EQ(tip_at(*edit, static_cast<QMenu*>(edit)->actionGeometry(static_cast<QMenu*>(edit)->actions()[0]).center()),
-            reason);
+            kNoRoom);
   edit->close();
   int disabled = 0;
   for (const QAction* action : window_->findChildren<QAction*>()) {
     // Fields for text have actions of their own, without a text.
     if (action->isEnabled() || !action->isVisible() || action->text().isEmpty()) continue;
     ++disabled;
-    EXPECT_EQ(action->toolTip().toStdString(), reason) << action->text().toStdString();
+    EXPECT_EQ(action->toolTip().toStdString(), kNoRoom) << action->text().toStdString();
   }
   EXPECT_GT(disabled, 40) << "of them 24 tools";
   // The pointer that enters and leaves a disabled button leaves the sentence in the status bar.
   window_->statusBar()->showMessage("A sentence.");
-  EXPECT_EQ(tip_at(*drill, drill->rect().center()), reason);
+  EXPECT_EQ(tip_at(*drill, drill->rect().center()), kNoRoom);
   QTest::mouseMove(window_->windowHandle(), view_->mapTo(window_.get(), middle()));
   QTest::qWait(50);
   EXPECT_EQ(window_->statusBar()->currentMessage().toStdString(), "A sentence.");
-  // While a room opens, nothing else is to be opened.
+}
+
+TEST_F(DisabledParts, SayWhyWhileARoomOpensAndWhenItIsOpen) {
+  const auto* undo = window_->findChild<QAction*>("undo");
+  const auto* drill = window_->findChild<QToolButton*>("drill");
+  const auto* panel = window_->findChild<QDockWidget*>("tool_panel");
   window_->practise(desk_->bone());
   EXPECT_EQ(undo->toolTip().toStdString(), "The room opens. Wait for it.");
   EXPECT_EQ(drill->toolTip().toStdString(), "The room opens. Wait for it.");
@@ -106,7 +111,7 @@ TEST_F(DisabledParts, SayWhyInTheirToolTips) {
   EXPECT_TRUE(window_->findChild<QWidget*>("irrigation_box")->isEnabled());
   EXPECT_TRUE(window_->findChild<QWidget*>("suction_box")->isEnabled());
   trigger("start_page");
-  EXPECT_EQ(of_tool->toolTip().toStdString(), reason);
+  EXPECT_EQ(of_tool->toolTip().toStdString(), kNoRoom);
 }
 
 TEST_F(DisabledParts, AnEnabledPartGetsItsOwnToolTipBack) {

@@ -967,15 +967,15 @@
     </message>
     <message>
         <source>Irrigation and suction work only with a bone that you opened in this window.</source>
-        <translation>Spülung und Absaugung wirken nur bei einem Knochen, den Sie in diesem Fenster geöffnet haben.</translation>
+        <translation>Spülung und Absaugung wirken nur bei einem hier geöffneten Knochen.</translation>
     </message>
     <message>
         <source>Only a bone that you opened in this window can be saved here.</source>
-        <translation>Nur ein Knochen, den Sie in diesem Fenster geöffnet haben, kann hier gespeichert werden.</translation>
+        <translation>Nur ein hier geöffneter Knochen kann gespeichert werden.</translation>
     </message>
     <message>
         <source>Wear and force law work only with a bone that you opened in this window.</source>
-        <translation>Verschleiß und Kraftgesetz wirken nur bei einem Knochen, den Sie in diesem Fenster geöffnet haben.</translation>
+        <translation>Verschleiß und Kraftgesetz wirken nur bei einem hier geöffneten Knochen.</translation>
     </message>
     <message>
         <source>A click places this tool. It has neither wear nor force law.</source>
