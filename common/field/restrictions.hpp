@@ -46,7 +46,7 @@ struct Decider {
 };
 
 inline constexpr int kWholeShare = 1000;
-inline constexpr int kMostForceLimit = 10'000;  // 100 N
+inline constexpr int kMostForceLimit = 10000;  // 100 N
 inline constexpr std::size_t kMostLimitedTools = 64, kMostSupervisionWords = 256;
 
 // Error invalid_input, naming the field: a number out of range, tools unsorted or too many, words too long.

@@ -10,7 +10,7 @@ namespace {
 
 constexpr double kBleed = 0.1;  // share of the handle's free motion
 // With less force a burr leaves bone a hundred times a second; nobody feels that plunge [A].
-constexpr double kLeastToLetGo_n = 3.0;
+constexpr double kLeastToRelease_n = 3.0;
 constexpr double kNothing_mm = 1e-9;
 
 }  // namespace
@@ -105,7 +105,7 @@ CouplingForce Coupling::step(const CouplingMoment& moment, const ProxyStep& prox
     release(slack_mm_, e_mm, e_mm * (most_mm / e_mm.norm()));
     force.limited = true;
   }
-  if (proxy.breakthrough && k * e_mm.norm() >= kLeastToLetGo_n) {
+  if (proxy.breakthrough && k * e_mm.norm() >= kLeastToRelease_n) {
     release(slack_mm_, e_mm, Vec3::Zero());
     force.breakthrough = true;
   }

@@ -6,13 +6,17 @@
 #include <QLabel>
 #include <QMenu>
 #include <QSettings>
+#include <QStatusBar>
 #include <QTest>
 #include <QToolButton>
 #include <QToolTip>
 #include <QWindow>
 #include <chrono>
+#include <string>
 
 #include "tests/integration/window_bench.hpp"
+#include "viewer_client/desktop/enabled.hpp"
+#include "viewer_client/desktop/start_page.hpp"
 
 namespace osteon {
 namespace {
@@ -25,49 +29,118 @@ class DisabledParts : public test::WindowBench {
     QSettings().setValue("tour/seen", true);
     WindowBench::SetUp();
   }
-};
-
-// Where nothing can be done yet, the pointer finds the reason.
-TEST_F(DisabledParts, SayWhyInTheirToolTips) {
-  const QString reason = "Open a bone or join a room first.";
-  const auto tip_at = [&](QWidget& widget, const QPoint& at) {
+  // The tool tip that the pointer finds there.
+  static std::string tip_at(QWidget& widget, const QPoint& at) {
     QToolTip::hideText();
+    EXPECT_TRUE(until([] { return !QToolTip::isVisible(); }, 5s)) << "the tip of before stays";
     QWidget* window = widget.window();
     QTest::mouseMove(window->windowHandle(), widget.mapTo(window, at) + QPoint(1, 0));
     QTest::mouseMove(window->windowHandle(), widget.mapTo(window, at));
     EXPECT_TRUE(until([] { return QToolTip::isVisible(); }, 5s));
-    return QToolTip::text();
-  };
+    return QToolTip::text().toStdString();
+  }
+  static constexpr const char* kNoRoom = "Open a bone or join a room first.";
+};
+
+// Where nothing can be done yet, the pointer finds the reason.
+TEST_F(DisabledParts, SayWhyInTheirToolTips) {
   auto* drill = window_->findChild<QToolButton*>("drill");
   auto* panel = window_->findChild<QDockWidget*>("tool_panel");
   auto* edit = window_->findChild<QAction*>("undo")->associatedWidgets().value(0);
   ASSERT_NE(qobject_cast<QMenu*>(edit), nullptr);
   EXPECT_FALSE(drill->isEnabled());
-  EXPECT_EQ(tip_at(*drill, drill->rect().center()), reason);
-  EXPECT_EQ(tip_at(*panel, QPoint(20, 8)), reason) << "its title";
-  EXPECT_EQ(tip_at(*window_->findChild<QLabel*>("force_bone"), QPoint(2, 2)), reason) << "a part of another panel";
+  EXPECT_EQ(tip_at(*drill, drill->rect().center()), kNoRoom);
+  EXPECT_EQ(tip_at(*panel, QPoint(20, 8)), kNoRoom) << "its title";
+  EXPECT_EQ(tip_at(*window_->findChild<QLabel*>("force_bone"), QPoint(2, 2)), kNoRoom) << "a part of another panel";
   static_cast<QMenu*>(edit)->popup(window_->mapToGlobal(QPoint(200, 200)));
   ASSERT_TRUE(QTest::qWaitForWindowExposed(edit));
-  const QAction* undo = window_->findChild<QAction*>("undo");
   EXPECT_EQ(tip_at(*edit, static_cast<QMenu*>(edit)->actionGeometry(static_cast<QMenu*>(edit)->actions()[0]).center()),
-            reason);
+            kNoRoom);
   edit->close();
   int disabled = 0;
   for (const QAction* action : window_->findChildren<QAction*>()) {
-    if (action->isEnabled() || !action->isVisible() || action->objectName().startsWith("qt_")) continue;
+    // Fields for text have actions of their own, without a text.
+    if (action->isEnabled() || !action->isVisible() || action->text().isEmpty()) continue;
     ++disabled;
-    EXPECT_EQ(action->toolTip(), reason) << action->objectName().toStdString();
+    EXPECT_EQ(action->toolTip().toStdString(), kNoRoom) << action->text().toStdString();
   }
   EXPECT_GT(disabled, 40) << "of them 24 tools";
+  // The pointer that enters and leaves a disabled button leaves the sentence in the status bar.
+  window_->statusBar()->showMessage("A sentence.");
+  EXPECT_EQ(tip_at(*drill, drill->rect().center()), kNoRoom);
+  QTest::mouseMove(window_->windowHandle(), view_->mapTo(window_.get(), middle()));
+  QTest::qWait(50);
+  EXPECT_EQ(window_->statusBar()->currentMessage().toStdString(), "A sentence.");
+}
+
+TEST_F(DisabledParts, SayWhyWhileARoomOpensAndWhenItIsOpen) {
+  const auto* undo = window_->findChild<QAction*>("undo");
+  const auto* drill = window_->findChild<QToolButton*>("drill");
+  const auto* panel = window_->findChild<QDockWidget*>("tool_panel");
+  window_->practise(desk_->bone());
+  EXPECT_EQ(undo->toolTip().toStdString(), "The room opens. Wait for it.");
+  EXPECT_EQ(drill->toolTip().toStdString(), "The room opens. Wait for it.");
   open();
-  EXPECT_EQ(undo->toolTip(), "Undo");
-  EXPECT_TRUE(undo->statusTip().isEmpty());
+  EXPECT_EQ(undo->toolTip().toStdString(), "Undo");
   EXPECT_TRUE(drill->isEnabled());
-  EXPECT_EQ(drill->toolTip(), "Drill 3.2 mm");
+  EXPECT_EQ(drill->toolTip().toStdString(), "Drill 3.2 mm");
   EXPECT_TRUE(panel->toolTip().isEmpty());
   EXPECT_EQ(tip_at(*window_->findChild<QLabel*>("teeth"), QPoint(2, 2)), "Choose a tool on the left first.");
   click_tool("drill");
-  EXPECT_TRUE(window_->findChild<QLabel*>("teeth")->parentWidget()->toolTip().isEmpty());
+  QWidget* of_tool = window_->findChild<QLabel*>("teeth")->parentWidget();
+  EXPECT_TRUE(of_tool->toolTip().isEmpty());
+  // An item has neither wear nor law. The drill's tips come back.
+  auto* wear = window_->findChild<QWidget*>("wear_set");
+  const std::string of_wear = wear->toolTip().toStdString();
+  const std::string of_law = window_->findChild<QWidget*>("law_set")->toolTip().toStdString();
+  EXPECT_NE(of_wear.find("1 is sharp"), std::string::npos);
+  click_tool("pin");
+  for (const char* part : {"wear_set", "law_set"}) {
+    EXPECT_FALSE(window_->findChild<QWidget*>(part)->isEnabled()) << part;
+    EXPECT_EQ(window_->findChild<QWidget*>(part)->toolTip().toStdString(),
+              "A click places this tool. It has neither wear nor force law.")
+        << part;
+  }
+  click_tool("drill");
+  EXPECT_EQ(wear->toolTip().toStdString(), of_wear);
+  EXPECT_EQ(window_->findChild<QWidget*>("law_set")->toolTip().toStdString(), of_law);
+  // Irrigation and suction need no tool.
+  trigger("put_down");
+  EXPECT_FALSE(of_tool->isEnabled());
+  EXPECT_EQ(of_tool->toolTip().toStdString(), "Choose a tool on the left first.");
+  EXPECT_TRUE(window_->findChild<QWidget*>("irrigation_box")->isEnabled());
+  EXPECT_TRUE(window_->findChild<QWidget*>("suction_box")->isEnabled());
+  trigger("start_page");
+  EXPECT_EQ(of_tool->toolTip().toStdString(), kNoRoom);
+}
+
+TEST_F(DisabledParts, AnEnabledPartGetsItsOwnToolTipBack) {
+  QWidget part;
+  part.setToolTip("its own");
+  set_enabled(part, true, "");
+  EXPECT_EQ(part.toolTip().toStdString(), "its own");
+  set_enabled(part, false, "first reason");
+  set_enabled(part, false, "second reason");
+  EXPECT_FALSE(part.isEnabled());
+  EXPECT_EQ(part.toolTip().toStdString(), "second reason");
+  set_enabled(part, true, "");
+  EXPECT_TRUE(part.isEnabled());
+  EXPECT_EQ(part.toolTip().toStdString(), "its own");
+}
+
+TEST_F(DisabledParts, TheStartPageSaysWhyItWaits) {
+  auto* page = window_->findChild<QWidget*>("import")->parentWidget();
+  auto* start = dynamic_cast<StartPage*>(page);
+  ASSERT_NE(start, nullptr);
+  const std::string own = window_->findChild<QWidget*>("import")->toolTip().toStdString();
+  start->show_work("A case is made");
+  for (const char* choice : {"examples", "recent", "import", "open", "join"})
+    EXPECT_EQ(window_->findChild<QWidget*>(choice)->toolTip().toStdString(),
+              "A bone or a room is being opened. Wait for it, or cancel it.")
+        << choice;
+  start->end_work({});
+  EXPECT_EQ(window_->findChild<QWidget*>("import")->toolTip().toStdString(), own);
+  EXPECT_TRUE(window_->findChild<QWidget*>("examples")->toolTip().isEmpty());
 }
 
 }  // namespace

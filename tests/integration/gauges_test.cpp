@@ -9,6 +9,8 @@
 #include <QLocale>
 #include <QStatusBar>
 #include <QTest>
+#include <QToolTip>
+#include <QWidget>
 #include <fstream>
 #include <iterator>
 #include <memory>
@@ -77,12 +79,13 @@ TEST(HandForce, IsThePointersElseThatOfTheStatesDevice) {
   EXPECT_EQ(hand_force(state, output)->device_holds_n, 30.0);
 }
 
-// The tip of a tool, above the middle of the plate below.
-CuttingState tool_at(const char* name, double above_mm) {
-  CuttingState state;
-  state.tool_name = name;
-  state.pose_bone_tool.position_mm = {0, 0, above_mm};
-  return state;
+// The tip of a tool, above the middle of the plate below. `holder`: empty for the own hand.
+HeldTool tool_at(const char* name, double above_mm, const char* holder) {
+  HeldTool tool;
+  tool.state.tool_name = name;
+  tool.state.pose_bone_tool.position_mm = {0, 0, above_mm};
+  tool.holder = holder;
+  return tool;
 }
 
 // A square plate of 200 mm in the plane z = 0, without thickness. So the distance of a point above it is its z.
@@ -96,33 +99,62 @@ std::shared_ptr<const SurgicalPlan> plan_with_plate() {
   return std::make_shared<const SurgicalPlan>(plan);
 }
 
-TEST(RiskGauge, ShowsTheNearestOfAllPeoplesToolsAndEachInItsToolTip) {
+TEST(RiskGauge, SaysWhoseToolIsNearestAndEachInItsToolTip) {
   const test::Desk desk;
   ASSERT_TRUE(desk.stands()) << "Xvfb is needed; deploy/install installs it";
   QLocale::setDefault(QLocale::c());
   RiskGauge gauge;
   gauge.set_limit_mm(5.0);
   gauge.set_plan(plan_with_plate());
-  const std::string drill = tool_title("drill-3.2").toStdString(), burr = tool_title("burr-round-5").toStdString();
-  ASSERT_NE(drill, burr);
+  const QString drill = tool_title("drill-3.2");
 
-  const CuttingState far = tool_at("drill-3.2", 40.0), near = tool_at("burr-round-5", 2.0), empty = tool_at("", 1.0);
-  gauge.show_tools(std::vector{empty});
+  // Two people hold the same drill.
+  const HeldTool ours = tool_at("drill-3.2", 40.0, ""), theirs = tool_at("drill-3.2", 2.0, "Berg");
+  gauge.show_tools({});
   EXPECT_TRUE(gauge.isHidden()) << "no hand holds a tool";
-  gauge.show_tools(std::vector{empty, far});
-  EXPECT_EQ(gauge.text().toStdString(), "plate: 40.0 mm") << "one tool needs no name";
+  gauge.show_tools(std::vector{ours});
+  EXPECT_EQ(gauge.text().toStdString(), "plate: 40.0 mm") << "the own tool alone needs no name";
   EXPECT_FALSE(gauge.warns());
+  gauge.show_tools(std::vector{theirs});
+  EXPECT_EQ(gauge.text().toStdString(), "Berg: Near plate: 2.0 mm");
   // Whoever comes first in the list.
-  for (const auto& states : {std::vector{far, near}, std::vector{near, far}}) {
-    gauge.show_tools(states);
-    EXPECT_EQ(gauge.text().toStdString(), burr + ": Near plate: 2.0 mm");
+  for (const auto& tools : {std::vector{ours, theirs}, std::vector{theirs, ours}}) {
+    gauge.show_tools(tools);
+    EXPECT_EQ(gauge.text().toStdString(), "Berg: Near plate: 2.0 mm");
     EXPECT_TRUE(gauge.warns());
-    EXPECT_TRUE(gauge.toolTip().split('\n').contains(QString::fromStdString(drill + ": plate: 40.0 mm")));
-    EXPECT_TRUE(gauge.toolTip().split('\n').contains(QString::fromStdString(burr + ": Near plate: 2.0 mm")));
+    EXPECT_TRUE(gauge.toolTip().split('\n').contains("Your tool (" + drill + "): plate: 40.0 mm"));
+    EXPECT_TRUE(gauge.toolTip().split('\n').contains("Berg (" + drill + "): Near plate: 2.0 mm"));
   }
+  gauge.show_tools(std::vector{tool_at("drill-3.2", 1.0, ""), theirs});
+  EXPECT_EQ(gauge.text().toStdString(), "Your tool: Near plate: 1.0 mm");
+
+  // A long name does not widen the status bar.
+  gauge.show_tools(std::vector{ours, tool_at("drill-3.2", 2.0, std::string(200, 'W').c_str())});
+  EXPECT_LT(gauge.sizeHint().width(), 400);
   gauge.show_tools({});
   EXPECT_TRUE(gauge.isHidden());
   EXPECT_TRUE(gauge.toolTip().isEmpty());
+}
+
+TEST(RiskGauge, ItsToolTipGoesOnWhileItIsRead) {
+  const test::Desk desk;
+  ASSERT_TRUE(desk.stands()) << "Xvfb is needed; deploy/install installs it";
+  QLocale::setDefault(QLocale::c());
+  QWidget window;
+  RiskGauge gauge(&window);
+  gauge.set_plan(plan_with_plate());
+  gauge.resize(300, 100);
+  window.resize(300, 100);
+  gauge.show_tools(std::vector{tool_at("drill-3.2", 40.0, "")});
+  window.show();
+  ASSERT_TRUE(QTest::qWaitForWindowExposed(&window));
+  QTest::mouseMove(window.windowHandle(), QPoint(50, 50));
+  QTest::mouseMove(window.windowHandle(), QPoint(51, 50));
+  ASSERT_TRUE(QTest::qWaitFor([] { return QToolTip::isVisible(); }, 10000));
+  ASSERT_TRUE(QToolTip::text().endsWith("40.0 mm"));
+  gauge.show_tools(std::vector{tool_at("drill-3.2", 39.0, "")});
+  EXPECT_TRUE(QToolTip::text().endsWith("39.0 mm")) << QToolTip::text().toStdString();
+  QToolTip::hideText();
 }
 
 class ToolPanel : public test::WindowBench {

@@ -14,6 +14,7 @@
 #include <string>
 
 #include "tests/integration/window_bench.hpp"
+#include "tests/support/pad/busy_sdl.hpp"
 #include "tests/support/pad/virtual_pad.hpp"
 
 namespace osteon {
@@ -103,6 +104,33 @@ TEST_F(PadTest, APadDrillsRumblesUndoesAndLetsGoWhenItIsUnplugged) {
   EXPECT_TRUE(says("Virtual Pad was unplugged. It no longer leads the tool.")) << problem();
   EXPECT_TRUE(until([&] { return label("device") == "Pointer"; }));
   EXPECT_EQ(pointer.push_n(), wheel_n);
+}
+
+TEST_F(PadTest, APushEndsWhileThePadDoesNotAnswerAndNeedsAFreshPullThen) {
+  ASSERT_TRUE(plug_->plug_in());
+  ASSERT_TRUE(until([&] { return says("Virtual Pad: choose a tool."); })) << problem();
+  click_tool("drill");
+  ToolPointer& pointer = view_->pointer();
+  GamePadState hand;
+  hand.left.x() = 1.0;
+  plug_->hold(hand);
+  ASSERT_TRUE(until([&] { return pointer.on_bone(); })) << problem();
+  hand = {};
+  plug_->hold(hand);
+  QTest::qWait(100);
+  hand.right_trigger = 0.8;
+  plug_->hold(hand);
+  ASSERT_TRUE(until([&] { return pointer.pushing(); })) << problem();
+
+  test::BusySdl busy;
+  EXPECT_TRUE(until([&] { return !pointer.pushing(); }, 15s));
+  EXPECT_TRUE(busy.end()) << "the push ended only when SDL went on";
+  QTest::qWait(300);
+  EXPECT_FALSE(pointer.pushing()) << "the trigger is still pulled";
+  plug_->hold({});
+  QTest::qWait(300);
+  plug_->hold(hand);
+  EXPECT_TRUE(until([&] { return pointer.pushing(); })) << problem();
 }
 
 }  // namespace

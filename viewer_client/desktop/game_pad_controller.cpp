@@ -1,6 +1,7 @@
 #include "viewer_client/desktop/game_pad_controller.hpp"
 
 #include <algorithm>
+#include <chrono>
 #include <utility>
 
 #include "viewer_client/desktop/bone_view.hpp"
@@ -10,6 +11,8 @@ namespace osteon {
 namespace {
 
 constexpr double kLongestTick_s = 0.1;  // a window that was busy does not throw the tool far away
+// SDL waits for the device, so nobody knows whether the user has let go. The usual age is 8 ms.
+constexpr std::chrono::milliseconds kStalled{150};
 
 }  // namespace
 
@@ -30,7 +33,7 @@ void GamePadController::tick(bool may_act, const RumbleInput& feel) {
     events_.said(tr("%1: choose a tool. The left stick moves it, the right trigger pushes.").arg(name));
   }
   if (!read.is_open) return;
-  if (!may_act) return rest();
+  if (!may_act || read.age > kStalled) return rest();
   const GamePadCommand command = mapping_.step(read.state);
   view_.follow_pad(command, dt_s);
   if (command.undoes) events_.undo();

@@ -31,7 +31,7 @@ class GamePadController {
   GamePadController(BoneView& view, Events events);
 
   // Takes what was read of the pad, moves the tool and sets the motors. Call it once a frame. `may_act`: this window is
-  // in front. Otherwise it does what rest() does.
+  // in front. Otherwise, and while the pad does not answer, it does what rest() does.
   void tick(bool may_act, const RumbleInput& feel);
   // For a pause between ticks: releases all controls and stops the motors.
   void rest();

@@ -48,6 +48,7 @@
 #include "viewer_client/desktop/tool_names.hpp"
 #include "viewer_client/desktop/tour.hpp"
 #include "viewer_client/desktop/view_options.hpp"
+#include "viewer_client/scene/held_tools.hpp"
 
 namespace osteon {
 
@@ -193,14 +194,19 @@ void MainWindow::make_status() {
 }
 
 void MainWindow::enable_room_actions(bool on) {
-  const QString no_room = tr("Open a bone or join a room first."), watches = tr("You only watch this room.");
+  const QString no_room =
+      practice_ || room_ ? tr("The room opens. Wait for it.") : tr("Open a bone or join a room first.");
+  const QString watches = tr("You only watch this room.");
   for (QAction* action : room_actions_) set_enabled(*action, on, no_room);
   tools_->set_tools_enabled(on && !watching_, on ? watches : no_room);
+  no_tool_ = !on ? no_room : watching_ ? watches : tr("Choose a tool on the left first.");
+  properties_->show_none(no_tool_);
   for (QDockWidget* panel : findChildren<QDockWidget*>())  // that of the connections says why there is no room
     set_enabled(*panel, on || panel->objectName() == "connection_panel", no_room);
   // A pointer's hand has another one. Who watches has no pointer.
   for (QAction* action : {irrigation_, suction_})
-    set_enabled(*action, on && pointer_, on ? tr("This window moves no hand in this room.") : no_room);
+    set_enabled(*action, on && pointer_,
+                on ? tr("Irrigation and suction work only with a bone that you opened in this window.") : no_room);
   if (watching_)
     for (const char* name : kWorkActions) set_enabled(*findChild<QAction*>(name), false, watches);
 }
@@ -287,6 +293,9 @@ void MainWindow::practise(const std::filesystem::path& bone, const std::filesyst
   options.bone = bone;
   options.folder = session.empty() ? new_session_folder(bone) : session;
   options.cache = data_folder() / "cache";
+  // Another person who joins has another name, so the window finds its own hand by it.
+  own_name_ = QString("osteon-%1").arg(QCoreApplication::applicationPid());
+  options.hand_name = own_name_;
   options.tool = first_tool_.empty() ? kFirstTool : QString::fromStdString(first_tool_);
   options.force_choice = chosen_force();
   options.sound = sound_->isChecked();
@@ -314,6 +323,7 @@ void MainWindow::practise(const std::filesystem::path& bone, const std::filesyst
                                     [this](const QString& sentence) { say(sentence); },
                                     [this](const QString& sentence) { practice_failed(sentence); }});
   practice_->start();
+  enable_room_actions(false);
 }
 
 void MainWindow::room_opened(const QString& address) {
@@ -323,8 +333,10 @@ void MainWindow::room_opened(const QString& address) {
 
 void MainWindow::join(const RoomAddress& room) {
   leave_room();
+  own_name_ = room.name;  // that of the user's haptic client, if there is one
   start_->show_work(tr("Joining the room at %1").arg(room.address));
   enter_room(room);
+  enable_room_actions(false);
 }
 
 void MainWindow::enter_room(const RoomAddress& room) {
@@ -369,7 +381,8 @@ void MainWindow::show_joined(const WatchedRoom& room) {
   pages_->setCurrentWidget(view_);
   if (!practice_) setWindowTitle(tr("%1 – Osteon").arg(QString::fromStdString(room.case_title)));
   enable_room_actions(true);
-  set_enabled(*findChild<QAction*>("save_bone"), opened_.has_value(), tr("The server of this room has the bone."));
+  set_enabled(*findChild<QAction*>("save_bone"), opened_.has_value(),
+              tr("Only a bone that you opened in this window can be saved here."));
   gauge_timer_.start(kGaugePeriod_ms);
   capped_.start();
   cap_timer_.start(kCapPeriod_ms);
@@ -406,6 +419,7 @@ void MainWindow::leave_room() {
   set_watching(false);
   enable_room_actions(false);
   address_.clear();
+  own_name_.clear();
   room_name_.clear();
   setWindowTitle("Osteon");
   for (QLabel* label : {device_, position_, connection_}) label->clear();
@@ -427,7 +441,10 @@ void MainWindow::room_ended(const QString& sentence) {
 void MainWindow::take_tool(const std::string& tool) {
   if (!room_ || watching_) return tools_->show_held({});
   const bool held = can_hold(tool) && pointer_;
-  properties_->show_tool(tool, held);
+  properties_->show_tool(tool, held ? QString()
+                               : can_hold(tool)
+                                   ? tr("Wear and force law work only with a bone that you opened in this window.")
+                                   : tr("A click places this tool. It has neither wear nor force law."));
   tools_->show_held(tool);
   if (held) {
     placing_.clear();
@@ -456,6 +473,7 @@ void MainWindow::put_tool_down() {
   view_->pointer().set_spindle(false);
   if (spindle_) spindle_->setChecked(false);
   tools_->show_held({});
+  properties_->show_none(no_tool_);
   send_pointer();
 }
 
@@ -576,8 +594,9 @@ void MainWindow::follow_pad() {
     const SceneUpdater* updater = view_->updater();
     feel.force_n = hand->force_hand_n.norm();
     feel.most_n = hand->device_holds_n;
-    feel.cuts =
-        updater != nullptr && !updater->states().empty() && updater->states().front().phase == CuttingPhase::cutting;
+    const auto states = updater != nullptr ? updater->states() : std::span<const CuttingState>();
+    const CuttingState* own = own_state(states, room_->people(), own_name_.toStdString());
+    feel.cuts = own != nullptr && own->phase == CuttingPhase::cutting;
   }
   pad_->tick(isActiveWindow(), feel);
 }
@@ -590,14 +609,23 @@ void MainWindow::refresh_gauges() {
                                             : tr("Connected to %1").arg(address_));
   const std::optional<PointerOutput> hand = pointer_ ? pointer_->newest() : std::nullopt;
   const SceneUpdater* updater = view_->updater();
-  if (updater != nullptr && !updater->states().empty()) {
-    const CuttingState& state = updater->states().front();
+  const auto states = updater != nullptr ? updater->states() : std::span<const CuttingState>();
+  const std::vector<PersonSeen> people = room_->people();
+  const std::string own_name = own_name_.toStdString();
+  const CuttingState* own = own_state(states, people, own_name);
+  if (!states.empty()) {
+    const CuttingState& state = own != nullptr ? *own : states.front();
     gauges_->show(state, hand, 1e-3 * static_cast<double>(clock_.elapsed()));
     show_other_hand(state);
   }
-  const CuttingState* held = updater != nullptr ? updater->held_tool() : nullptr;
-  if (held != nullptr) {
-    const Vec3& at = held->pose_bone_tool.position_mm;
+  const std::vector<HeldTool> tools = held_tools(states, people, own_name);
+  // The tip of the own tool, also where another one is nearer to a structure. Who has no hand sees that of the only
+  // tool.
+  const auto tip = std::ranges::find_if(tools, &HeldTool::own);
+  if (const HeldTool* shown = tip != tools.end()                    ? &*tip
+                              : own == nullptr && tools.size() == 1 ? &tools.front()
+                                                                    : nullptr) {
+    const Vec3& at = shown->state.pose_bone_tool.position_mm;
     position_->setText(tr("Tip %1, %2, %3 mm")
                            .arg(QLocale().toString(at.x(), 'f', 1), QLocale().toString(at.y(), 'f', 1),
                                 QLocale().toString(at.z(), 'f', 1)));
@@ -605,7 +633,7 @@ void MainWindow::refresh_gauges() {
     position_->clear();
   }
   risk_->set_plan(updater != nullptr ? updater->plan() : nullptr);
-  risk_->show_tools(updater != nullptr ? updater->states() : std::span<const CuttingState>());
+  risk_->show_tools(tools);
   if (const QString fault = QString::fromStdString(view_->take_plan_fault()); !fault.isEmpty()) say(fault);
   if (pointer_)
     device_->setText(!pointer_->connected() ? tr("The pointer's device is away")

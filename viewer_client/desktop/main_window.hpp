@@ -169,6 +169,8 @@ class MainWindow : public QMainWindow {
   bool closes_when_saved_ = false;
   std::string placing_;  // the item that the next click places
   QString address_, room_name_;
+  QString own_name_;  // of the user's hand in the room; empty: none
+  QString no_tool_;   // why the panel Tool has no tool
   QTimer gauge_timer_, pointer_timer_, cap_timer_;
   QElapsedTimer clock_;
   QElapsedTimer capped_;    // since the SpaceMouse was asked last

@@ -123,10 +123,10 @@ void PracticeRoom::start_haptic() {
   connect(haptic_.get(), &QProcess::errorOccurred, this, [this](QProcess::ProcessError error) {
     if (error == QProcess::FailedToStart) fail(tr("osteon-haptic is not installed. Install the package osteon."));
   });
-  haptic_->start(
-      program_path("osteon-haptic"),
-      {"--server", address_, "--plain", "--device", "pointer:" + text_of(options_.pointer), "--tool", options_.tool,
-       "--force-choice", options_.force_choice, "--cache", text_of(options_.cache), "--timeout", "60"});
+  haptic_->start(program_path("osteon-haptic"),
+                 {"--server", address_, "--plain", "--name", options_.hand_name, "--device",
+                  "pointer:" + text_of(options_.pointer), "--tool", options_.tool, "--force-choice",
+                  options_.force_choice, "--cache", text_of(options_.cache), "--timeout", "60"});
   QTimer::singleShot(kSettled_ms, haptic_.get(), [this] { haptic_deaths_ = 0; });
 }
 

@@ -21,6 +21,7 @@ struct PracticeOptions {
   std::filesystem::path cache;    // where the haptic client keeps cases
   std::filesystem::path pointer;  // socket of the window's pointer
   std::filesystem::path sound_socket;
+  QString hand_name;     // of the haptic client; others in the room see it
   QString tool;          // that the hand holds first
   QString force_choice;  // as --force-choice of the haptic client names it
   bool sound = true;

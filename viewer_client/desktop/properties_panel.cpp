@@ -8,7 +8,9 @@
 #include <QFormLayout>
 #include <QLabel>
 #include <QLocale>
+#include <QMargins>
 #include <QSpinBox>
+#include <QVBoxLayout>
 #include <algorithm>
 #include <initializer_list>
 #include <utility>
@@ -39,12 +41,21 @@ void fix_width(QComboBox& box) {
 PropertiesPanel::PropertiesPanel(std::function<void(const Chosen&)> changed,
                                  std::function<void(const std::string&)> resized, QWidget* parent)
     : QWidget(parent), changed_(std::move(changed)), resized_(std::move(resized)) {
-  form_ = new QFormLayout(this);
+  of_tool_ = new QWidget;
+  auto* form = new QFormLayout(of_tool_);
+  auto* all = new QVBoxLayout(this);
+  all->setContentsMargins(0, 0, 0, 0);
+  all->addWidget(of_tool_);
+  switches_ = new QVBoxLayout;
+  const QMargins beside = form->contentsMargins();
+  switches_->setContentsMargins(beside.left(), 0, beside.right(), beside.bottom());
+  all->addLayout(switches_);
+  all->addStretch();
   const auto row = [&](const QString& what, const char* name, QWidget* widget) {
     widget->setObjectName(name);
     // A screen reader would read the name of a label instead of its text. The row names it too.
     if (qobject_cast<QLabel*>(widget) == nullptr) widget->setAccessibleName(what);
-    form_->addRow(what, widget);
+    form->addRow(what, widget);
   };
   size_ = new QComboBox;
   size_->setObjectName("size");
@@ -52,7 +63,7 @@ PropertiesPanel::PropertiesPanel(std::function<void(const Chosen&)> changed,
   for (const ToolGroup& group : tool_groups())
     for (const std::string& tool : group.tools) size_->addItem(tool_title(tool));
   fix_width(*size_);
-  form_->addRow(size_);
+  form->addRow(size_);
   rpm_ = new QSpinBox;
   rpm_->setRange(0, kMostRpm);
   rpm_->setSingleStep(100);
@@ -79,8 +90,8 @@ PropertiesPanel::PropertiesPanel(std::function<void(const Chosen&)> changed,
   law_->setAccessibleName(tr("Force law"));
   for (const ForceLaw& law : force_laws()) law_->addItem(law_title(std::string(law.name)));
   fix_width(*law_);
-  form_->addRow(new QLabel(tr("Force law")));
-  form_->addRow(law_);  // over the whole width, because names of laws are long
+  form->addRow(new QLabel(tr("Force law")));
+  form->addRow(law_);  // over the whole width, because names of laws are long
   const auto say = [this] {
     if (!showing_) changed_(chosen());
   };
@@ -98,10 +109,10 @@ PropertiesPanel::PropertiesPanel(std::function<void(const Chosen&)> changed,
     if (!showing_) chosen_[tool_].law = law.toStdString();
     say();
   });
-  set_enabled(*this, false, tr("Choose a tool on the left first."));
 }
 
-void PropertiesPanel::show_wear_and_law(const Tool& tool, bool held) {
+void PropertiesPanel::show_wear_and_law(const Tool& tool, const QString& not_held) {
+  for (QWidget* part : std::initializer_list<QWidget*>{wear_, law_}) set_enabled(*part, true, {});
   const auto found = chosen_.find(tool.name);
   const WearAndLaw chosen = found == chosen_.end() ? WearAndLaw{} : found->second;
   wear_->setValue(chosen.wear.value_or(kSharp));
@@ -111,13 +122,15 @@ void PropertiesPanel::show_wear_and_law(const Tool& tool, bool held) {
       law_->addItem(law_title(std::string(law.name)), QString::fromStdString(std::string(law.name)));
   if (const Result<const ForceLaw*> law = choose_law(tool, chosen.law))
     law_->setCurrentIndex(law_->findData(QString::fromStdString(std::string((*law)->name))));
-  for (QWidget* part : std::initializer_list<QWidget*>{wear_, law_}) part->setEnabled(held);
+  for (QWidget* part : std::initializer_list<QWidget*>{wear_, law_}) set_enabled(*part, not_held.isEmpty(), not_held);
 }
 
-void PropertiesPanel::show_tool(const std::string& name, bool held) {
+void PropertiesPanel::show_none(const QString& reason) { set_enabled(*of_tool_, false, reason); }
+
+void PropertiesPanel::show_tool(const std::string& name, const QString& not_held) {
   const Result<Tool> tool = find_tool(name);
-  set_enabled(*this, tool.has_value(), tr("Choose a tool on the left first."));
   if (!tool) return;
+  set_enabled(*of_tool_, true, {});
   showing_ = true;
   tool_ = name;
   size_->clear();
@@ -131,7 +144,7 @@ void PropertiesPanel::show_tool(const std::string& name, bool held) {
   teeth_->setText(tool->teeth > 0 ? QString::number(tool->teeth) : QString("–"));
   feed_->setText(tool->feed_mm_per_rev > 0.0 ? tr("%1 mm").arg(QLocale().toString(tool->feed_mm_per_rev, 'g', 3))
                                              : QString("–"));
-  show_wear_and_law(*tool, held);
+  show_wear_and_law(*tool, not_held);
   showing_ = false;
 }
 
@@ -147,7 +160,7 @@ void PropertiesPanel::add_switch(QAction& action) {
   auto* box = new QCheckBox(action.iconText());
   box->setObjectName(action.objectName() + "_box");
   box->setChecked(action.isChecked());
-  form_->addRow(box);
+  switches_->addWidget(box);
   connect(box, &QCheckBox::clicked, &action, &QAction::trigger);
   connect(&action, &QAction::toggled, box, &QCheckBox::setChecked);
   connect(&action, &QAction::changed, box,

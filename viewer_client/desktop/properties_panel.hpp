@@ -11,9 +11,9 @@
 class QAction;
 class QComboBox;
 class QDoubleSpinBox;
-class QFormLayout;
 class QLabel;
 class QSpinBox;
+class QVBoxLayout;
 
 namespace osteon {
 
@@ -37,21 +37,24 @@ class PropertiesPanel : public QWidget {
   PropertiesPanel(std::function<void(const Chosen&)> changed, std::function<void(const std::string&)> resized,
                   QWidget* parent = nullptr);
 
-  // Shows the tool's own values, and the wear and law that were chosen for it. `held`: it can be held here. Otherwise
-  // wear and law cannot be chosen.
-  void show_tool(const std::string& tool, bool held);
+  // Shows the tool's own values, and the wear and law that were chosen for it. `not_held`: why it cannot be held here,
+  // so that wear and law cannot be chosen; empty: it can.
+  void show_tool(const std::string& tool, const QString& not_held);
+  // There is no tool, for this reason. The switches stay as they are.
+  void show_none(const QString& reason);
   void show_push(double push_n);
   // A check box for an action that can be checked. Either shows the other's state.
   void add_switch(QAction& action);
   [[nodiscard]] Chosen chosen() const;
 
  private:
-  void show_wear_and_law(const Tool& tool, bool held);
+  void show_wear_and_law(const Tool& tool, const QString& not_held);
 
   std::function<void(const Chosen&)> changed_;
   std::function<void(const std::string&)> resized_;
-  bool showing_ = false;  // its own change of a value is none of the user's
-  QFormLayout* form_;
+  bool showing_ = false;   // its own change of a value is none of the user's
+  QWidget* of_tool_;       // all parts but the switches
+  QVBoxLayout* switches_;  // of the other hand, which needs no tool
   QComboBox* size_;
   QSpinBox *rpm_, *push_;
   QLabel *teeth_, *feed_;

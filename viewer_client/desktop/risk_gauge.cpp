@@ -1,8 +1,10 @@
 #include "viewer_client/desktop/risk_gauge.hpp"
 
+#include <QCursor>
 #include <QLocale>
 #include <QSettings>
 #include <QStringList>
+#include <QToolTip>
 #include <utility>
 
 #include "viewer_client/desktop/structure_names.hpp"
@@ -13,7 +15,7 @@ namespace osteon {
 namespace {
 
 constexpr const char* kLimitKey = "view/risk_limit_mm";
-constexpr int kNameWidth_px = 220;
+constexpr int kNameWidth_px = 220, kHolderWidth_px = 120;
 // Black on orange: seen with any colour vision, and readable. A word besides says the same.
 constexpr const char* kWarning = "QLabel { background: #e69f00; color: black; font-weight: bold; padding: 0 4px; }";
 
@@ -45,22 +47,33 @@ QString RiskGauge::sentence_of(const NearestStructure& found, const QString& str
                                          : tr("%1: %2 mm").arg(structure, distance);
 }
 
-void RiskGauge::show_tools(std::span<const CuttingState> states) {
+QString RiskGauge::holder_of(const HeldTool& tool) {
+  return tool.own() ? tr("Your tool") : QString::fromStdString(tool.holder);
+}
+
+// Qt does not renew a tool tip that is read just now.
+void RiskGauge::show_tip(const QString& words) {
+  if (words == toolTip()) return;
+  setToolTip(words);
+  if (QToolTip::isVisible() && underMouse()) QToolTip::showText(QCursor::pos(), words, this);
+}
+
+void RiskGauge::show_tools(std::span<const HeldTool> tools) {
   std::optional<NearestStructure> nearest;
-  QString nearest_tool;
+  const HeldTool* nearest_tool = nullptr;
   QStringList of_each;
-  for (const CuttingState& state : states) {
-    if (state.tool_name.empty() || !distances_) continue;
-    const auto found = distances_->nearest(state.pose_bone_tool.position_mm);
+  for (const HeldTool& tool : tools) {
+    const auto found = distances_ ? distances_->nearest(tool.state.pose_bone_tool.position_mm) : std::nullopt;
     if (!found) continue;
-    const QString tool = tool_title(state.tool_name);
-    of_each << tool + ": " + sentence_of(*found, structure_title(plan_->structures[found->structure].name));
+    of_each << tr("%1 (%2): %3")
+                   .arg(holder_of(tool), tool_title(tool.state.tool_name),
+                        sentence_of(*found, structure_title(plan_->structures[found->structure].name)));
     if (nearest && found->distance_mm >= nearest->distance_mm) continue;
     nearest = found;
-    nearest_tool = tool;
+    nearest_tool = &tool;
   }
   setVisible(nearest.has_value());
-  setToolTip(of_each.join('\n'));
+  show_tip(of_each.join('\n'));
   if (!nearest) {
     clear();
     return;
@@ -70,7 +83,8 @@ void RiskGauge::show_tools(std::span<const CuttingState> states) {
   warns_ = warns;
   const QString whole = structure_title(plan_->structures[nearest->structure].name);
   const QString sentence = sentence_of(*nearest, fontMetrics().elidedText(whole, Qt::ElideRight, kNameWidth_px));
-  setText(of_each.size() > 1 ? nearest_tool + ": " + sentence : sentence);
+  const QString holder = fontMetrics().elidedText(holder_of(*nearest_tool), Qt::ElideRight, kHolderWidth_px);
+  setText(of_each.size() > 1 || !nearest_tool->own() ? tr("%1: %2").arg(holder, sentence) : sentence);
 }
 
 }  // namespace osteon

@@ -6,7 +6,7 @@
 #include <optional>
 #include <span>
 
-#include "common/mechanics/cutting_state.hpp"
+#include "viewer_client/scene/held_tools.hpp"
 #include "viewer_client/scene/structure_distances.hpp"
 
 namespace osteon {
@@ -22,9 +22,9 @@ class RiskGauge : public QLabel {
 
   // Null: there is none.
   void set_plan(std::shared_ptr<const SurgicalPlan> plan);
-  // Of all people in the room. The gauge shows the tool that is nearest, and its tool tip shows each of them. Empty
-  // hands do not count. The name of a tool is shown where several people hold one.
-  void show_tools(std::span<const CuttingState> states);
+  // Of all people in the room. The gauge shows the tool that is nearest, and its tool tip shows each of them. It says
+  // whose tool that is, unless only the user of this window holds one.
+  void show_tools(std::span<const HeldTool> tools);
 
   // Below this distance, mm, the gauge warns. The settings store it.
   [[nodiscard]] double limit_mm() const { return limit_mm_; }
@@ -32,6 +32,8 @@ class RiskGauge : public QLabel {
   [[nodiscard]] bool warns() const { return warns_; }
 
  private:
+  [[nodiscard]] static QString holder_of(const HeldTool& tool);
+  void show_tip(const QString& words);
   [[nodiscard]] QString sentence_of(const NearestStructure& found, const QString& structure) const;
 
   std::shared_ptr<const SurgicalPlan> plan_;  // shared with the picture

@@ -5,6 +5,8 @@
 #include <chrono>
 #include <utility>
 
+#include "viewer_client/net/people_client.hpp"
+
 namespace osteon {
 
 RoomLink::RoomLink(const RoomSubscriptionOptions& options, Events events) : events_(std::move(events)) {
@@ -40,6 +42,11 @@ void RoomLink::work(const RoomSubscriptionOptions& options) {
     subscription_ = std::move(*made);
     events_.joined(subscription_->room());
   });
+  // If the server sends nothing about its people, the window shows the room all the same.
+  PeopleClientOptions people_options{.address = options.address, .patience = options.patience};
+  people_options.window = [&subscription] { return subscription.joined(); };
+  const auto people = PeopleClient::start(people_options, [this] { return stop_.load(); });
+  if (people) in_gui([this, client = people->get()] { people_ = client; });
   using namespace std::chrono_literals;
   while (!stop_) {
     std::function<void(RoomSubscription&)> job;
@@ -54,6 +61,10 @@ void RoomLink::work(const RoomSubscriptionOptions& options) {
     job(subscription);
   }
   // If the GUI thread never ran the call above, `made` still has the subscription. It outlives every job here.
+}
+
+std::vector<PersonSeen> RoomLink::people() const {
+  return people_ != nullptr ? people_->people() : std::vector<PersonSeen>();
 }
 
 void RoomLink::ask(Request request, Answered answered) {

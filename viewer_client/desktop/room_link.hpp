@@ -8,13 +8,17 @@
 #include <memory>
 #include <optional>
 #include <thread>
+#include <vector>
 
 #include "common/core/mutex.hpp"
 #include "common/core/result.hpp"
 #include "viewer_client/net/room_subscription.hpp"
 #include "viewer_client/scene/render_queue.hpp"
+#include "viewer_client/scene/supervision_client.hpp"
 
 namespace osteon {
+
+class PeopleClient;
 
 // [GUI thread], except for what runs inside.
 class RoomLink : public QObject {
@@ -39,6 +43,8 @@ class RoomLink : public QObject {
   void ping();
   [[nodiscard]] std::optional<double> round_trip_ms() const { return round_trip_ms_; }  // of the newest answer
   [[nodiscard]] RenderQueue& queue() { return queue_; }
+  // Everybody in the room, as far as the server says. Empty until it does.
+  [[nodiscard]] std::vector<PersonSeen> people() const;
   [[nodiscard]] bool joined() const { return subscription_ != nullptr; }
   [[nodiscard]] bool interrupted() const { return subscription_ && subscription_->interrupted(); }
   [[nodiscard]] std::optional<Error> failure_seen() const;
@@ -53,6 +59,7 @@ class RoomLink : public QObject {
   // Made by the own thread; the GUI thread has it from then on. Its functions may be called by both.
   std::unique_ptr<RoomSubscription> subscription_;
 
+  PeopleClient* people_ = nullptr;  // the own thread's, which ends in the destructor
   std::optional<double> round_trip_ms_;
   bool pinging_ = false;
 

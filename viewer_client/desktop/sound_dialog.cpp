@@ -15,6 +15,8 @@
 #include <cmath>
 #include <utility>
 
+#include "viewer_client/desktop/enabled.hpp"
+
 namespace osteon {
 
 namespace {
@@ -127,7 +129,7 @@ SoundDialog::SoundDialog(const Chosen& chosen, std::function<void(const Chosen&)
 
 void SoundDialog::report_choice() {
   percent_->setText(tr("%1 %").arg(volume_->value()));
-  volume_->setEnabled(on_->isChecked());
+  set_enabled(*volume_, on_->isChecked(), tr("The sound is off."));
   if (!showing_) changed_({on_->isChecked(), volume_->value()});
 }
 

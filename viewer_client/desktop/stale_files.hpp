@@ -8,7 +8,8 @@
 
 namespace osteon {
 
-// Each window has one, as long as it is open. The first window to open and the last one to close remove them.
+// Each open window has one. A window removes the stale files when it opens and when it closes, unless another one is
+// open.
 class StaleFiles {
  public:
   // `sockets`: the folder of the windows' sockets.

@@ -11,6 +11,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "viewer_client/desktop/enabled.hpp"
+
 namespace osteon {
 
 namespace {
@@ -129,7 +131,8 @@ void StartPage::show_work(const QString& what) {
   progress_->setRange(0, 0);
   progress_->show();
   cancel_->show();
-  for (QWidget* choice : choices_) choice->setEnabled(false);
+  const QString reason = tr("A bone or a room is being opened. Wait for it, or cancel it.");
+  for (QWidget* choice : choices_) set_enabled(*choice, false, reason);
 }
 
 void StartPage::show_progress(int percent) {
@@ -141,7 +144,7 @@ void StartPage::end_work(const QString& sentence) {
   words_->setText(sentence);
   progress_->hide();
   cancel_->hide();
-  for (QWidget* choice : choices_) choice->setEnabled(true);
+  for (QWidget* choice : choices_) set_enabled(*choice, true, {});
 }
 
 }  // namespace osteon

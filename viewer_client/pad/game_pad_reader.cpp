@@ -11,6 +11,8 @@ namespace osteon {
 
 namespace {
 
+using Clock = std::chrono::steady_clock;
+
 // Half a frame of the window.
 constexpr std::chrono::milliseconds kPeriod{8};
 // While no pad is open. Looking for one takes longer than reading one.
@@ -23,7 +25,8 @@ struct GamePadReader::State {
   CondVar wake;
   bool stopping OSTEON_GUARDED_BY(mutex) = false;
   GamePadReading reading OSTEON_GUARDED_BY(mutex);
-  std::optional<GamePadRumble> rumble OSTEON_GUARDED_BY(mutex);  // set since the last period
+  std::optional<Clock::time_point> polled OSTEON_GUARDED_BY(mutex);  // end of the last poll()
+  std::optional<GamePadRumble> rumble OSTEON_GUARDED_BY(mutex);      // set since the last period
   std::thread thread;
 
   void run() {
@@ -45,10 +48,14 @@ struct GamePadReader::State {
   void note(GamePad::Change change, const GamePad& pad) OSTEON_REQUIRES(mutex) {
     // A pad that came and went between two readings was never there.
     if (change == GamePad::Change::lost && !std::exchange(reading.opened, false)) reading.lost = true;
-    if (change == GamePad::Change::opened) reading.opened = true;
+    if (change == GamePad::Change::opened) {
+      reading.opened = true;
+      rumble = std::nullopt;  // it was for the pad before
+    }
     reading.is_open = pad.is_open();
     reading.name = pad.name();
     reading.state = pad.state();
+    polled = Clock::now();
   }
 };
 
@@ -68,6 +75,7 @@ GamePadReader::~GamePadReader() {
 GamePadReading GamePadReader::take() {
   const MutexLock lock(state_->mutex);
   GamePadReading taken = state_->reading;
+  if (state_->polled) taken.age = Clock::now() - *state_->polled;
   state_->reading.lost = state_->reading.opened = false;
   return taken;
 }

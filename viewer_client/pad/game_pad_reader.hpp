@@ -1,5 +1,6 @@
 // Reads a game pad on a thread of its own, because SDL opens devices, and a device may take its time.
 #pragma once
+#include <chrono>
 #include <memory>
 #include <string>
 
@@ -13,6 +14,8 @@ struct GamePadReading {
   bool is_open = false;
   std::string name;    // of the pad that was open last
   GamePadState state;  // at rest while no pad is open
+  // Since the state was read. It grows while SDL waits for a device. Zero before the first reading.
+  std::chrono::steady_clock::duration age{};
 };
 
 // SDL starts, is used and ends on that thread, as libudev asks. [any thread]
@@ -25,7 +28,7 @@ class GamePadReader {
 
   // Never waits for SDL.
   [[nodiscard]] GamePadReading take();
-  // Sets the strength of the motors, as GamePad::rumble() does, within one period.
+  // Sets the strength of the motors of the open pad, as GamePad::rumble() does, within one period.
   void rumble(const GamePadRumble& strength);
 
  private:

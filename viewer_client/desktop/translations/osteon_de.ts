@@ -954,16 +954,32 @@
         <translation>Sie sehen in diesem Raum nur zu.</translation>
     </message>
     <message>
-        <source>This window moves no hand in this room.</source>
-        <translation>Dieses Fenster bewegt in diesem Raum keine Hand.</translation>
-    </message>
-    <message>
         <source>A case is made or checked. Wait for it, or cancel it.</source>
         <translation>Ein Fall wird erstellt oder geprüft. Warten Sie, oder brechen Sie ab.</translation>
     </message>
     <message>
-        <source>The server of this room has the bone.</source>
-        <translation>Der Server dieses Raums hat den Knochen.</translation>
+        <source>The room opens. Wait for it.</source>
+        <translation>Der Raum wird geöffnet. Warten Sie, bis er offen ist.</translation>
+    </message>
+    <message>
+        <source>Choose a tool on the left first.</source>
+        <translation>Wählen Sie erst links ein Werkzeug.</translation>
+    </message>
+    <message>
+        <source>Irrigation and suction work only with a bone that you opened in this window.</source>
+        <translation>Spülung und Absaugung wirken nur bei einem hier geöffneten Knochen.</translation>
+    </message>
+    <message>
+        <source>Only a bone that you opened in this window can be saved here.</source>
+        <translation>Nur ein hier geöffneter Knochen kann gespeichert werden.</translation>
+    </message>
+    <message>
+        <source>Wear and force law work only with a bone that you opened in this window.</source>
+        <translation>Verschleiß und Kraftgesetz wirken nur bei einem hier geöffneten Knochen.</translation>
+    </message>
+    <message>
+        <source>A click places this tool. It has neither wear nor force law.</source>
+        <translation>Ein Klick setzt dieses Werkzeug. Es hat weder Verschleiß noch Kraftgesetz.</translation>
     </message>
 </context>
 <context>
@@ -1068,10 +1084,6 @@
         <translation>Schneiden macht das Werkzeug stumpfer. Die Anzeige sagt, wie stumpf es ist.</translation>
     </message>
     <message>
-        <source>Choose a tool on the left first.</source>
-        <translation>Wählen Sie erst links ein Werkzeug.</translation>
-    </message>
-    <message>
         <source>This tool has no spindle.</source>
         <translation>Dieses Werkzeug hat keine Spindel.</translation>
     </message>
@@ -1153,6 +1165,18 @@
     <message>
         <source>%1: %2 mm</source>
         <translation>%1: %2 mm</translation>
+    </message>
+    <message>
+        <source>Your tool</source>
+        <translation>Ihr Werkzeug</translation>
+    </message>
+    <message>
+        <source>%1 (%2): %3</source>
+        <translation>%1 (%2): %3</translation>
+    </message>
+    <message>
+        <source>%1: %2</source>
+        <translation>%1: %2</translation>
     </message>
 </context>
 <context>
@@ -1267,6 +1291,10 @@
         <source>the sound has not begun yet.</source>
         <translation>Der Ton hat noch nicht begonnen.</translation>
     </message>
+    <message>
+        <source>The sound is off.</source>
+        <translation>Der Ton ist aus.</translation>
+    </message>
 </context>
 <context>
     <name>StartPage</name>
@@ -1321,6 +1349,10 @@
     <message>
         <source>Open an .osteon file, or the case.json of a folder</source>
         <translation>Öffnet eine .osteon-Datei oder die case.json eines Ordners</translation>
+    </message>
+    <message>
+        <source>A bone or a room is being opened. Wait for it, or cancel it.</source>
+        <translation>Ein Knochen oder Raum wird geöffnet. Warten Sie, oder brechen Sie ab.</translation>
     </message>
 </context>
 <context>

@@ -95,18 +95,18 @@ TEST(FootPedal, SwitchAndAxisAreChosenByWords) {
                             "irrigation-", "irrigation", "suction-left:left:right"})
     EXPECT_FALSE(read_pedal_switch(wrong)) << wrong;
 
-  struct Said {
+  struct Report {
     std::string_view words;
     bool inverted;
     int page, usage;  // 0: none
   };
-  for (const Said& said : {Said{"", false, 0, 0},
-                           {"inverted", true, 0, 0},
-                           {"z", false, 1, 0x32},
-                           {"rz:inverted", true, 1, 0x35},
-                           {"inverted:0x30", true, 1, 0x30},
-                           {"54", false, 1, 0x36},
-                           {"brake", false, 2, 0xc5}}) {
+  for (const Report& said : {Report{"", false, 0, 0},
+                             {"inverted", true, 0, 0},
+                             {"z", false, 1, 0x32},
+                             {"rz:inverted", true, 1, 0x35},
+                             {"inverted:0x30", true, 1, 0x30},
+                             {"54", false, 1, 0x36},
+                             {"brake", false, 2, 0xc5}}) {
     const auto options = read_pedal_axis(said.words);
     ASSERT_TRUE(options) << said.words;
     EXPECT_TRUE(options->proportional);

@@ -3,12 +3,11 @@
 
 #include <gtest/gtest.h>
 
-#include <atomic>
 #include <chrono>
-#include <future>
 #include <memory>
 #include <thread>
 
+#include "tests/support/pad/busy_sdl.hpp"
 #include "tests/support/pad/virtual_pad.hpp"
 #include "tests/support/wait.hpp"
 
@@ -18,37 +17,6 @@ namespace {
 using namespace std::chrono_literals;
 
 constexpr auto kReaderPatience = 20s;
-
-// Holds SDL's lock of all pads, as a device that does not answer does.
-class BusySdl {
- public:
-  BusySdl() {
-    thread_ = std::thread([this] {
-      test::VirtualPad::lock_sdl();
-      held_.set_value();
-      free_.get_future().wait_for(kReaderPatience);
-      waited_too_long_ = !asked_;
-      test::VirtualPad::unlock_sdl();
-    });
-    held_.get_future().wait();
-  }
-  ~BusySdl() { end(); }
-  BusySdl(const BusySdl&) = delete;
-  BusySdl& operator=(const BusySdl&) = delete;
-  // False: somebody waited for SDL until the lock was given up.
-  bool end() {
-    if (!thread_.joinable()) return !waited_too_long_;
-    asked_ = true;
-    free_.set_value();
-    thread_.join();
-    return !waited_too_long_;
-  }
-
- private:
-  std::promise<void> held_, free_;
-  std::atomic<bool> asked_ = false, waited_too_long_ = false;
-  std::thread thread_;
-};
 
 class GamePadReaderTest : public testing::Test {
  protected:
@@ -73,7 +41,7 @@ class GamePadReaderTest : public testing::Test {
 
 TEST_F(GamePadReaderTest, NobodyWaitsForASdlThatDoesNotAnswer) {
   ASSERT_TRUE(plug_.plug_in());
-  BusySdl busy;
+  test::BusySdl busy;
   reader_ = std::make_unique<GamePadReader>();
   // Meanwhile its thread comes to SDL.
   for (const auto until = std::chrono::steady_clock::now() + 300ms; std::chrono::steady_clock::now() < until;) {
@@ -84,6 +52,32 @@ TEST_F(GamePadReaderTest, NobodyWaitsForASdlThatDoesNotAnswer) {
   EXPECT_TRUE(busy.end()) << "somebody waited";
   EXPECT_TRUE(reads([&] { return read_.is_open; }));
   EXPECT_EQ(opened_, 1);
+}
+
+TEST_F(GamePadReaderTest, AStateThatSdlDoesNotRenewBecomesOld) {
+  ASSERT_TRUE(plug_.plug_in());
+  reader_ = std::make_unique<GamePadReader>();
+  ASSERT_TRUE(reads([&] { return read_.is_open && read_.age < 100ms; }));
+  test::BusySdl busy;
+  const auto from = std::chrono::steady_clock::now();
+  ASSERT_TRUE(reads([&] { return read_.age > 200ms; }));
+  EXPECT_GT(std::chrono::steady_clock::now() - from, 100ms) << "it was new when SDL stopped";
+  EXPECT_TRUE(read_.is_open);
+  EXPECT_TRUE(busy.end()) << "somebody waited";
+  EXPECT_TRUE(reads([&] { return read_.age < 100ms; }));
+}
+
+TEST_F(GamePadReaderTest, ARumbleFromBeforeAPadDoesNotReachIt) {
+  ASSERT_TRUE(plug_.plug_in());
+  test::BusySdl busy;
+  reader_ = std::make_unique<GamePadReader>();
+  reader_->rumble({1.0, 1.0});
+  EXPECT_TRUE(busy.end());
+  ASSERT_TRUE(reads([&] { return read_.is_open; }));
+  // A later one does, so the first one is not still on its way.
+  reader_->rumble({0.25, 0.0});
+  ASSERT_TRUE(test::wait_until([&] { return !plug_.heard().empty() && !plug_.quiet(); }, kReaderPatience));
+  for (const auto& motors : plug_.heard()) EXPECT_LT(motors.low, 0.5 * 65535);
 }
 
 TEST_F(GamePadReaderTest, APadIsReadRumblesAndIsLostOnce) {
