@@ -59,9 +59,7 @@ TEST_F(GamePadReaderTest, AStateThatSdlDoesNotRenewBecomesOld) {
   reader_ = std::make_unique<GamePadReader>();
   ASSERT_TRUE(reads([&] { return read_.is_open && read_.age < 100ms; }));
   test::BusySdl busy;
-  const auto from = std::chrono::steady_clock::now();
   ASSERT_TRUE(reads([&] { return read_.age > 200ms; }));
-  EXPECT_GT(std::chrono::steady_clock::now() - from, 100ms) << "it was new when SDL stopped";
   EXPECT_TRUE(read_.is_open);
   EXPECT_TRUE(busy.end()) << "somebody waited";
   EXPECT_TRUE(reads([&] { return read_.age < 100ms; }));
