@@ -727,8 +727,10 @@ TEST_F(WindowTest, AWindowThatWatchesFollowsTheToolAndChangesNothing) {
   for (const char* name : {"undo", "redo", "mark", "put_down", "spindle"})
     EXPECT_FALSE(other.findChild<QAction*>(name)->isEnabled()) << name;
   EXPECT_EQ(other.findChild<QAction*>("undo")->toolTip(), "You only watch this room.");
-  EXPECT_EQ(other.findChild<QCheckBox*>("suction_box")->toolTip(), "This window moves no hand in this room.");
-  EXPECT_EQ(other.findChild<QAction*>("save_bone")->toolTip(), "The server of this room has the bone.");
+  EXPECT_EQ(other.findChild<QCheckBox*>("suction_box")->toolTip(),
+            "Irrigation and suction work only with a bone that you opened in this window.");
+  EXPECT_EQ(other.findChild<QAction*>("save_bone")->toolTip(),
+            "Only a bone that you opened in this window can be saved here.");
   EXPECT_TRUE(other.findChild<QAction*>("look_tool")->isEnabled());
   EXPECT_FALSE(other.findChild<QToolButton*>("drill")->isEnabled());
   for (const char* name : {"drill", "pin"}) other.findChild<QToolButton*>(name)->defaultAction()->trigger();
