@@ -34,11 +34,11 @@ class Raised {
  public:
   explicit Raised(int priority) noexcept {
     const sched_param raised{.sched_priority = priority};
-    known_ = pthread_getschedparam(pthread_self(), &policy_, &before_) == 0 &&
-             pthread_setschedparam(pthread_self(), SCHED_RR, &raised) == 0;
+    raised_ = pthread_getschedparam(pthread_self(), &policy_, &before_) == 0 &&
+              pthread_setschedparam(pthread_self(), SCHED_RR, &raised) == 0;
   }
   ~Raised() {
-    if (known_) pthread_setschedparam(pthread_self(), policy_, &before_);
+    if (raised_) pthread_setschedparam(pthread_self(), policy_, &before_);
   }
   Raised(const Raised&) = delete;
   Raised& operator=(const Raised&) = delete;
@@ -46,7 +46,7 @@ class Raised {
  private:
   int policy_ = SCHED_OTHER;
   sched_param before_{};
-  bool known_ = false;
+  bool raised_ = false;
 };
 
 // RtAudio's view of the server. It lists the sources too, and numbers them together with the sinks.

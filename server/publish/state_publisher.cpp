@@ -2,11 +2,22 @@
 
 #include <algorithm>
 #include <memory>
+#include <ranges>
 #include <utility>
 
 #include "common/wire/convert.hpp"
 
 namespace osteon {
+namespace {
+
+Bytes tools_message(RoomSeq room_seq, const auto& states) {
+  v1::WatchCuttingResponse response;
+  response.set_room_seq(room_seq.value);
+  for (const CuttingState& state : states) *response.add_states() = wire::to_wire(state);
+  return serialised(response);
+}
+
+}  // namespace
 
 StatePublisher::StatePublisher() : thread_([this] { run(); }) {}
 
@@ -84,30 +95,51 @@ void StatePublisher::show(const std::vector<SceneItem>& items, const std::vector
   changed_ = true;
 }
 
-void StatePublisher::make_message(RoomSeq room_seq, Clock::time_point now) {
-  v1::WatchCuttingResponse response;
-  response.set_room_seq(room_seq.value);
-  for (const auto& [author, shown] : states_) *response.add_states() = wire::to_wire(shown.state);
-  newest_ = {serialised(response), scene_};
+std::vector<CuttingState> StatePublisher::states() const {
+  std::vector<CuttingState> states;
+  for (const auto& [author, shown] : states_) states.push_back(shown.state);
+  return states;
+}
+
+void StatePublisher::set_newest(ShownNow message) {
+  newest_ = std::move(message);
   ++number_;
-  made_ = now;
-  changed_ = false;
   due_ = true;
 }
 
-void StatePublisher::publish_soon(RoomSeq room_seq, Clock::time_point now) {
+void StatePublisher::publish_soon(RoomSeq room_seq) {
   const MutexLock lock(states_mutex_);
-  if (!changed_ || now - made_ < kApart) return;
-  make_message(room_seq, now);
+  room_seq_ = std::max(room_seq_, room_seq);
+  if (!changed_ || soon_ || soon_left_ == 0) return;
+  --soon_left_;
+  soon_ = true;
   wake_.notify_one();
 }
 
-void StatePublisher::publish(RoomSeq room_seq, Clock::time_point now) {
+// Serialises without the lock, for which the tick would wait.
+void StatePublisher::make_message_soon() {
+  MutexLock lock(states_mutex_);
+  if (!std::exchange(soon_, false) || !std::exchange(changed_, false)) return;
+  const std::vector<CuttingState> shown = states();
+  const RoomSeq room_seq = room_seq_;
+  const Bytes scene = scene_;
+  const std::uint64_t number = number_;
+  lock.unlock();
+  ShownNow message{tools_message(room_seq, shown), scene};
+  lock.lock();
+  // A message that the tick has made meanwhile has these states, or newer ones.
+  if (number_ == number) set_newest(std::move(message));
+}
+
+void StatePublisher::publish(RoomSeq room_seq) {
   const MutexLock lock(states_mutex_);
+  room_seq_ = std::max(room_seq_, room_seq);
+  soon_left_ = kSoonPerTick;
   for (auto& [author, shown] : states_) shown.ticks_over += shown.over ? 1 : 0;
   if (std::erase_if(states_, [](const auto& entry) { return entry.second.ticks_over > kShowIdleTicks; }) > 0)
     changed_ = true;
-  if (changed_) make_message(room_seq, now);
+  if (std::exchange(changed_, false))
+    set_newest({tools_message(room_seq_, states_ | std::views::values | std::views::transform(&Shown::state)), scene_});
   due_ = due_ || owed_;
   if (due_) wake_.notify_one();
 }
@@ -115,17 +147,17 @@ void StatePublisher::publish(RoomSeq room_seq, Clock::time_point now) {
 void StatePublisher::run() {
   MutexLock lock(states_mutex_);
   while (true) {
-    while (!due_ && !end_) wake_.wait(lock);
-    if (!std::exchange(due_, false)) return;
+    while (!due_ && !soon_ && !end_) wake_.wait(lock);
+    if (!due_ && !soon_) return;
     lock.unlock();
+    make_message_soon();
     send(Clock::now());
     lock.lock();
     if (!send_to_sessions_) continue;
     const SendToSessions send = send_to_sessions_;
-    std::vector<CuttingState> states;
-    for (const auto& [author, shown] : states_) states.push_back(shown.state);
+    const std::vector<CuttingState> shown = states();
     lock.unlock();
-    const bool owed = send(states);
+    const bool owed = send(shown);
     lock.lock();
     owed_ |= owed;
   }
@@ -137,6 +169,7 @@ void StatePublisher::send(Clock::time_point now) {
   MutexLock states_lock(states_mutex_);
   const ShownNow shown = newest_;
   const std::uint64_t number = number_;
+  due_ = false;
   states_lock.unlock();
   bool owed = false;
   for (Stream& stream : streams_) {

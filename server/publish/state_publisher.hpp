@@ -39,9 +39,9 @@ class StatePublisher {
   using Clock = std::chrono::steady_clock;
   // A tool whose session has ended is shown idle for this many ticks, so that every reader sees it stop.
   static constexpr std::uint64_t kShowIdleTicks = 1200;
-  // A state that comes so long after the newest message does not wait for the tick. So there are no more messages than
-  // ticks.
-  static constexpr std::chrono::nanoseconds kApart{1'000'000'000 / 120};
+  // Messages between two ticks at most, beside the tick's own. States that come faster wait for the tick, so there are
+  // at most three messages for each tick.
+  static constexpr int kSoonPerTick = 2;
 
   StatePublisher();
   ~StatePublisher() { stop(); }
@@ -62,10 +62,11 @@ class StatePublisher {
   void update(CuttingState state);  // the newest of its author wins
   void session_over(AuthorId author);
   void show(const std::vector<SceneItem>& items, const std::vector<BodyId>& bodies);
-  // [tick] Enqueues what has changed since the last call, and what is still owed to slower readers.
-  void publish(RoomSeq room_seq, Clock::time_point now = Clock::now());
-  // Enqueues what has changed, if nothing was enqueued for kApart. If not, the next publish() does it.
-  void publish_soon(RoomSeq room_seq, Clock::time_point now = Clock::now());
+  // [tick] Enqueues what has changed since the newest message, and what is still owed to slower readers.
+  void publish(RoomSeq room_seq);
+  // [any thread] The publisher's thread enqueues what has changed, without waiting for the tick, up to kSoonPerTick
+  // times between two ticks. Beyond that the next publish() does it.
+  void publish_soon(RoomSeq room_seq);
   [[nodiscard]] std::vector<Vec3> tool_tips_mm() const;  // of the tools that somebody holds
 
  private:
@@ -80,7 +81,9 @@ class StatePublisher {
     std::uint64_t enqueued = 0;  // the newest message in its queue
   };
   void run();
-  void make_message(RoomSeq room_seq, Clock::time_point now) OSTEON_REQUIRES(states_mutex_);
+  void make_message_soon();
+  [[nodiscard]] std::vector<CuttingState> states() const OSTEON_REQUIRES(states_mutex_);
+  void set_newest(ShownNow message) OSTEON_REQUIRES(states_mutex_);
   void send(Clock::time_point now);
   static void enqueue(Stream& stream, std::uint64_t number, const ShownNow& shown, Clock::time_point now);
 
@@ -94,10 +97,12 @@ class StatePublisher {
   Bytes scene_ OSTEON_GUARDED_BY(states_mutex_) = std::make_shared<const std::string>();
   ShownNow newest_ OSTEON_GUARDED_BY(states_mutex_);           // nothing before the first message
   std::uint64_t number_ OSTEON_GUARDED_BY(states_mutex_) = 0;  // of the newest message, from 1
-  Clock::time_point made_ OSTEON_GUARDED_BY(states_mutex_);    // the newest message
   bool changed_ OSTEON_GUARDED_BY(states_mutex_) = false;      // since the newest message was made
   bool due_ OSTEON_GUARDED_BY(states_mutex_) = false;          // to be sent
-  bool owed_ OSTEON_GUARDED_BY(states_mutex_) = false;         // a reader lacks the newest message and wants it later
+  bool soon_ OSTEON_GUARDED_BY(states_mutex_) = false;         // a message is to be made before the tick
+  int soon_left_ OSTEON_GUARDED_BY(states_mutex_) = kSoonPerTick;
+  RoomSeq room_seq_ OSTEON_GUARDED_BY(states_mutex_);   // of the newest call
+  bool owed_ OSTEON_GUARDED_BY(states_mutex_) = false;  // a reader lacks the newest message and wants it later
   SendToSessions send_to_sessions_ OSTEON_GUARDED_BY(states_mutex_);
   bool end_ OSTEON_GUARDED_BY(states_mutex_) = false;
 

@@ -147,7 +147,7 @@ TEST_F(PointerInRoom, DrillsLosesItsWindowAndDrillsOn) {
       wait_until([&] { return haptic.err().find("device lost device=pointer") != std::string::npos; }, kPointerLimit));
   const auto lies_still = [&] {
     const std::vector<std::string> cells = last_cells(stage / "hand.csv");
-    return cells.size() == 24 && cells[3] == "idle" && std::stod(cells[7]) > 1.0 && std::stod(cells[10]) == 0.0 &&
+    return cells.size() == 27 && cells[3] == "idle" && std::stod(cells[7]) > 1.0 && std::stod(cells[10]) == 0.0 &&
            std::stod(cells[15]) == 0.0;
   };
   EXPECT_TRUE(wait_until(lies_still, kPointerLimit)) << testing::PrintToString(last_cells(stage / "hand.csv"));

@@ -1,13 +1,14 @@
 #include "tests/perf/sound_output/monitor.hpp"
 
+#include <pthread.h>
 #include <pulse/pulseaudio.h>
+#include <sched.h>
 
 #include <algorithm>
 #include <chrono>
 #include <cstring>
 #include <limits>
-
-#include "common/runtime/periodic.hpp"
+#include <utility>
 
 namespace osteon::test {
 namespace {
@@ -52,12 +53,16 @@ struct Monitor::Impl {
   std::vector<Fragment> fragments;  // up to `fragment_count`
   std::atomic<std::size_t> count{0}, fragment_count{0};
   std::atomic<std::uint64_t> holes{0};
-  bool is_realtime = false;
+  bool asked_realtime = false;
 };
 
 void Monitor::Impl::take() {
   const std::int64_t now_ns = std::chrono::steady_clock::now().time_since_epoch().count();
-  if (!is_realtime) is_realtime = try_realtime(kPriority);
+  // The thread of libpulse is known here only. It goes on as it is if the machine refuses.
+  if (!std::exchange(asked_realtime, true)) {
+    const sched_param wanted{.sched_priority = kPriority};
+    ::pthread_setschedparam(::pthread_self(), SCHED_FIFO, &wanted);
+  }
   const void* data = nullptr;
   std::size_t bytes = 0, end = count.load(std::memory_order_relaxed);
   Fragment fragment{end, end, now_ns};

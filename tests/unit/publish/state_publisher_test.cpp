@@ -2,8 +2,14 @@
 
 #include <gtest/gtest.h>
 
+#include <atomic>
+#include <chrono>
+#include <thread>
+#include <vector>
+
 #include "common/wire/convert.hpp"
 #include "osteon/v1/cutting.pb.h"
+#include "tests/support/wait.hpp"
 
 namespace osteon {
 namespace {
@@ -69,25 +75,88 @@ TEST(StatePublisher, TheToolOfAnEndedSessionRests) {
   EXPECT_TRUE(publisher.tool_tips_mm().empty());
 }
 
-// A state that comes alone is sent at once. Of those that come closer together than ticks, the tick sends the newest.
+constexpr std::chrono::seconds kPatience{20};
+
+CuttingState state_of(AuthorId author, std::uint64_t state_seq) {
+  CuttingState state;
+  state.author = author;
+  state.state_seq = state_seq;
+  return state;
+}
+
+// What a reader was sent, as the sum of the tools' sequence numbers, so that every new state changes it.
+class SumReader : public StateSubscriber {
+ public:
+  void enqueue(const ShownNow& now) override {
+    v1::WatchCuttingResponse message;
+    ASSERT_TRUE(message.ParseFromString(*now.tools));
+    std::uint64_t sum = 0;
+    for (const v1::CuttingState& state : message.states()) sum += state.state_seq();
+    ++messages;
+    sum_of_newest = sum;
+  }
+  void end(const std::string&) override {}
+  [[nodiscard]] std::size_t waiting() const override { return 0; }
+  // False: it did not come.
+  [[nodiscard]] bool comes(std::uint64_t sum) const {
+    return test::wait_until([&] { return sum_of_newest == sum; }, kPatience);
+  }
+  std::atomic<std::uint64_t> messages{0}, sum_of_newest{0};
+};
+
+// Up to a number between two ticks, whoever they are of. Of those that come faster, the tick sends the newest.
 TEST(StatePublisher, AStateDoesNotWaitForTheTick) {
-  const StatePublisher::Clock::time_point begin{std::chrono::seconds{100}};
+  constexpr std::uint64_t kSoon = StatePublisher::kSoonPerTick;
+  SumReader reader;
   StatePublisher publisher;
-  const auto came = [&](std::uint64_t state_seq, std::chrono::nanoseconds after) {
-    CuttingState state;
-    state.author = AuthorId{7};
-    state.state_seq = state_seq;
-    publisher.update(state);
-    publisher.publish_soon(RoomSeq{1}, begin + after);
-    return shown_by(publisher).state_seq;
-  };
-  EXPECT_EQ(came(1, {}), 1U);
-  EXPECT_EQ(came(2, StatePublisher::kApart / 2), 1U);
-  EXPECT_EQ(came(3, StatePublisher::kApart * 3 / 4), 1U);
-  publisher.publish(RoomSeq{1}, begin + StatePublisher::kApart * 7 / 8);
-  EXPECT_EQ(shown_by(publisher).state_seq, 3U);
-  EXPECT_EQ(came(4, StatePublisher::kApart), 3U) << "the tick has just sent one";
-  EXPECT_EQ(came(5, 2 * StatePublisher::kApart), 5U);
+  publisher.watch(reader);
+  std::uint64_t sum = 0;
+  for (int tick = 0; tick < 3; ++tick) {
+    for (std::uint64_t author = 1; author <= kSoon; ++author) {
+      publisher.update(state_of(AuthorId{author}, static_cast<std::uint64_t>(tick) + 1));
+      publisher.publish_soon(RoomSeq{1});
+      ASSERT_TRUE(reader.comes(++sum)) << "tool " << author << " in tick " << tick;
+    }
+    publisher.publish(RoomSeq{1});
+  }
+  EXPECT_EQ(reader.messages, 3 * kSoon) << "the ticks had nothing more to send";
+}
+
+TEST(StatePublisher, HasABoundOfMessagesBetweenTwoTicks) {
+  constexpr std::uint64_t kSoon = StatePublisher::kSoonPerTick, kMany = 10 * kSoon;
+  SumReader reader;
+  StatePublisher publisher;
+  publisher.watch(reader);
+  for (std::uint64_t seq = 1; seq <= kMany; ++seq) {
+    publisher.update(state_of(AuthorId{7}, seq));
+    publisher.publish_soon(RoomSeq{1});
+    ASSERT_TRUE(seq > kSoon || reader.comes(seq));
+  }
+  publisher.stop();  // sends what is due
+  EXPECT_EQ(reader.sum_of_newest, kSoon);
+  EXPECT_EQ(reader.messages, kSoon);
+}
+
+// What comes while the publisher's thread is busy is sent with what came before.
+TEST(StatePublisher, LosesNoState) {
+  constexpr std::uint64_t kStates = 2000, kAuthors = 4;
+  SumReader reader;
+  StatePublisher publisher;
+  publisher.watch(reader);
+  {
+    std::vector<std::jthread> hands;
+    for (std::uint64_t author = 1; author <= kAuthors; ++author)
+      hands.emplace_back([&publisher, author] {
+        for (std::uint64_t seq = 1; seq <= kStates; ++seq) {
+          publisher.update(state_of(AuthorId{author}, seq));
+          publisher.publish_soon(RoomSeq{seq});
+        }
+      });
+    for (int tick = 0; tick < 500; ++tick) publisher.publish(RoomSeq{1});
+  }
+  publisher.publish(RoomSeq{kStates});
+  publisher.stop();
+  EXPECT_EQ(reader.sum_of_newest, kAuthors * kStates);
 }
 
 }  // namespace

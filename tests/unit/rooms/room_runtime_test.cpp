@@ -6,6 +6,7 @@
 
 #include <atomic>
 #include <mutex>
+#include <optional>
 #include <thread>
 
 #include "common/volume/replica.hpp"
@@ -213,6 +214,61 @@ TEST(RoomRuntime, CopiesOfTheBoneAreRightWhileItIsCut) {
   for (const auto& session : late) EXPECT_EQ(session->hash(), alone.hash());
   for (const auto& session : late) runtime.leave(*session);
   runtime.leave(*hand);
+}
+
+// Keeps when it was sent a tool's state for the first time.
+class FirstState final : public StateSubscriber {
+ public:
+  void enqueue(const ShownNow& now) override {
+    v1::WatchCuttingResponse message;
+    ASSERT_TRUE(message.ParseFromString(*now.tools));
+    const std::lock_guard lock(mutex_);
+    if (!at_ && message.states_size() > 0) at_ = RoomRuntime::Clock::now();
+  }
+  void end(const std::string&) override {}
+  std::size_t waiting() const override { return 0; }
+  std::optional<RoomRuntime::Clock::time_point> at() const {
+    const std::lock_guard lock(mutex_);
+    return at_;
+  }
+
+ private:
+  mutable std::mutex mutex_;
+  std::optional<RoomRuntime::Clock::time_point> at_;
+};
+
+CuttingState state_of_a_tool() {
+  CuttingState state;
+  state.author = AuthorId{1};
+  state.state_seq = 1;
+  return state;
+}
+
+TEST(RoomRuntime, SendsAStateBeforeItsTick) {
+  // As long as a loaded machine may take for a thread, and no longer: the runtime ends with a tick.
+  constexpr auto kTick = 3s;
+  FirstState reader;
+  const RoomRuntime::Clock::time_point first_tick = RoomRuntime::Clock::now() + kTick;  // or later
+  RoomRuntime runtime(Room(test::test_block()), {.tick = kTick, .mesh = 3ms, .pieces = 0ns}, {});
+  runtime.watch_cutting(reader);
+  runtime.publish_state(state_of_a_tool());
+  runtime.stop();
+  runtime.leave(reader);
+  ASSERT_TRUE(reader.at());
+  EXPECT_LT(*reader.at(), first_tick);
+}
+
+TEST(RoomRuntime, SendsNoStateBeforeTheTickOfADrivenRoom) {
+  for (const bool ticks : {false, true}) {
+    FirstState reader;
+    RoomRuntime runtime(Room(test::test_block()), {.tick = 0ns, .mesh = 1s, .pieces = 0ns}, {});
+    runtime.watch_cutting(reader);
+    runtime.publish_state(state_of_a_tool());
+    if (ticks) runtime.tick(10ms);
+    runtime.stop();  // sends what is due
+    runtime.leave(reader);
+    EXPECT_EQ(reader.at().has_value(), ticks);
+  }
 }
 
 }  // namespace
