@@ -207,7 +207,7 @@ TEST(StateRecord, ReadsWhatTheHapticClientWrites) {
     row.report.cutting.engaged = 0.75;
     row.report.cutting.torque_nmm = 16 + i % 4;
     row.report.coupling.force_n = {3.0, 4.0, 0.0};
-    row.report.pose_bone_proxy.position_mm = {1, 2, 3};
+    row.report.pose_bone_proxy = pose_along({1, 2, 3}, {0.6, 0, -0.8});
     if (i >= 100) row.reading.buttons = haptic::kSuction;
     return row;
   };
@@ -240,6 +240,9 @@ TEST(StateRecord, ReadsWhatTheHapticClientWrites) {
       ASSERT_EQ((*state)->torque_Nmm, expected.report.cutting.torque_nmm);
       ASSERT_EQ((*state)->force_physical_N.norm(), 5.0);
       ASSERT_EQ((*state)->pose_bone_tool.position_mm, Vec3(1, 2, 3));
+      // Along it a drill breaks through. A burr may do so in any direction.
+      const Vec3 axis = i >= 500 ? Vec3(0, 0, 0) : Vec3(0.6, 0, -0.8);
+      ASSERT_LT((tool_sound(**state).feed_axis - axis).norm(), 1e-5) << i;
       ASSERT_EQ((*state)->suction, i >= 100);
     }
     const auto end = (*record)->next();
@@ -251,6 +254,16 @@ TEST(StateRecord, ReadsWhatTheHapticClientWrites) {
 
 constexpr const char* kHeader =
     "mono_ns,phase,tool,rpm,feed_mm_per_s,density_g_cm3,force_physical_n,torque_nmm,author\n";
+
+TEST(StateRecord, KnowsNoAxisInATableWithoutIt) {
+  const test::TempDir temp;
+  ASSERT_TRUE(write_file(temp / "log.csv", kHeader + std::string("1000,free,drill-3.2,900,0,0,0,0,3\n")));
+  const auto record = open_states(temp / "log.csv");
+  ASSERT_TRUE(record) << record.error().message;
+  const auto state = (*record)->next();
+  ASSERT_TRUE(state && *state);
+  EXPECT_EQ(tool_sound(**state).feed_axis, Vec3(0, 0, 0));
+}
 
 // The sentence with which a table is refused.
 std::string refusal(const std::string& text) {
