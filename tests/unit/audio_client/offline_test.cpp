@@ -140,9 +140,9 @@ TEST(OfflineSound, LooksAtTheMiddleOfTheWorkInBone) {
       states.back().pose_bone_tool.position_mm = tip_mm;
     }
     ListedStates record(states);
-    const auto middle_mm = middle_of_work(record, [](double) { return true; });
-    EXPECT_TRUE(middle_mm);
-    return *middle_mm;
+    const auto work = survey(record, [](double) { return true; });
+    EXPECT_TRUE(work);
+    return work->middle_mm;
   };
   using enum CuttingPhase;
   EXPECT_EQ(middle_of({{free, {500, 0, 0}}, {cutting, {1, 2, 3}}, {rubbing, {3, 6, 9}}, {idle, {0, 900, 0}}}),
@@ -466,6 +466,33 @@ TEST(RenderCommand, SaysThatTheFileBecomesTooLarge) {
                              HasSubstr("an older file of that name is as it was")));
   EXPECT_EQ(*read_file(temp / "x.wav"), "an older sound");
   EXPECT_EQ(std::distance(std::filesystem::directory_iterator(temp.path()), {}), 2);
+}
+
+// Two states that are nearly 4 hours apart: 48 000 frames of 6 bytes a second are 4.15 GB. A limit of the shell stops
+// what begins to write.
+TEST(RenderCommand, RefusesASoundAboveFourGigabytesBeforeItIsMade) {
+  const test::TempDir temp;
+  const std::string state = ",free,drill-3.2,900,0,0,0,0,1\n";
+  ASSERT_TRUE(write_file(temp / "long.csv", kHeader + ("1" + state) + "14390000000001" + state));
+  ASSERT_TRUE(write_file(temp / "x.wav", "an older sound"));
+  const auto error = [&](std::vector<std::string> options) {
+    std::vector<std::string> arguments = {
+        "-c",     "ulimit -f 64 && exec \"$@\"", "render", test::program("osteon-audio").string(),
+        "render", (temp / "long.csv").string(),  "--out",  (temp / "x.wav").string()};
+    arguments.insert(arguments.end(), options.begin(), options.end());
+    const auto ran = test::run("bash", arguments);
+    EXPECT_EQ(ran.exit_code, 1);
+    EXPECT_EQ(*read_file(temp / "x.wav"), "an older sound");
+    EXPECT_EQ(std::distance(std::filesystem::directory_iterator(temp.path()), {}), 2);
+    return ran.err;
+  };
+  // 4 000 000 000 / 288 000 = 13 889 s, and the drill runs down for 2 s of them.
+  EXPECT_THAT(error({"--bits", "24"}),
+              AllOf(HasSubstr("long.csv lasts 240 minutes"), HasSubstr("4.1 GB"),
+                    HasSubstr("--bits 16, --listen mono, a lower"), HasSubstr("at most 231 minutes")));
+  EXPECT_THAT(error({"--listen", "mono", "--rate", "192000"}), HasSubstr("5.5 GB"));
+  for (const auto& fits : {std::vector<std::string>{"--bits", "16"}, {"--bits", "24", "--listen", "mono"}})
+    EXPECT_THAT(error(fits), HasSubstr("could not be written whole (File too large)"));
 }
 
 TEST(RenderCommand, TakesNoSeedThatItWouldChange) {
