@@ -66,16 +66,38 @@ class Work {
   std::optional<Progress> bar_;
 };
 
-// The record does not have the bone's bounds, of which the live listener looks at the middle.
-Result<void> look_at_work(Space& space, const std::string& record, const StopSignal& stop) {
-  if (space.listening == Listening::mono) return {};
-  auto states = open_states(record);
+int channels_of(const Space& space) { return space.listening == Listening::mono ? 1 : 2; }
+
+// Of the sound that a record of that length becomes.
+double bytes_of(const RenderArguments& a, const Space& space, double seconds) {
+  return (seconds + kLongestTail_s) * a.rate_hz * channels_of(space) * a.bits / 8;
+}
+
+Result<void> check_size(const RenderArguments& a, const Space& space, double seconds) {
+  constexpr auto kMost = static_cast<double>(sound::WavWriter::kMostBytes);
+  if (bytes_of(a, space, seconds) <= kMost) return {};
+  const double longest_s = seconds * kMost / bytes_of(a, space, seconds);
+  std::array<char, 256> why{};
+  std::snprintf(why.data(), why.size(),
+                " lasts %.0f minutes, and its sound would be %.1f GB, but a WAV file holds 4 GB; use %s%sa lower "
+                "--rate or a part of the record of at most %.0f minutes",
+                seconds / 60, 1e-9 * bytes_of(a, space, seconds), a.bits == 24 ? "--bits 16, " : "",
+                channels_of(space) == 2 ? "--listen mono, " : "", std::floor(longest_s / 60));
+  return bad_input(a.record + why.data());
+}
+
+// Refuses a record whose sound is too large before that is made, and finds what the listener looks at: the record does
+// not have the bone's bounds, of which the live listener looks at the middle.
+Result<void> read_ahead(const RenderArguments& a, Space& space, const StopSignal& stop) {
+  constexpr auto kMost = static_cast<double>(sound::WavWriter::kMostBytes);
+  if (space.listening == Listening::mono && bytes_of(a, space, kLongestSession_s) <= kMost) return {};
+  auto states = open_states(a.record);
   if (!states) return tl::unexpected(states.error());
   Work work(stop, "reading the session");
-  const auto middle_mm = middle_of_work(**states, [&](double done) { return work.go_on(done); });
-  if (!middle_mm) return tl::unexpected(middle_mm.error());
-  move_to_middle(space, *middle_mm);
-  return {};
+  const auto recorded = survey(**states, [&](double done) { return work.go_on(done); });
+  if (!recorded) return tl::unexpected(recorded.error());
+  move_to_middle(space, recorded->middle_mm);
+  return check_size(a, space, recorded->seconds);
 }
 
 Result<SynthParams> synth_params(const RenderArguments& a) {
@@ -119,13 +141,13 @@ Result<std::string> run_render(const RenderArguments& a) {
   if (!params) return tl::unexpected(params.error());
   auto record = open_states(a.record);
   if (!record) return tl::unexpected(record.error());
-  auto writer = sound::WavWriter::open(
-      a.out, {.rate_hz = a.rate_hz, .channels = params->space.listening == Listening::mono ? 1 : 2, .bits = a.bits});
+  auto writer =
+      sound::WavWriter::open(a.out, {.rate_hz = a.rate_hz, .channels = channels_of(params->space), .bits = a.bits});
   if (!writer) return tl::unexpected(writer.error());
 
   const StopSignal stop(StopSignal::HangUp::stops);
   const auto begin = std::chrono::steady_clock::now();
-  const auto looked = look_at_work(params->space, a.record, stop);
+  const auto looked = read_ahead(a, params->space, stop);
   const Result<OfflineSound> sound =
       looked ? write_sound(**record, *params, *writer, stop) : Result<OfflineSound>(tl::unexpected(looked.error()));
   if (!sound && sound.error().code == ErrorCode::cancelled)

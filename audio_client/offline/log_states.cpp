@@ -3,6 +3,7 @@
 #include <array>
 #include <cmath>
 #include <fstream>
+#include <span>
 #include <string_view>
 #include <vector>
 
@@ -15,6 +16,7 @@ namespace {
 
 constexpr std::size_t kLongestLine = 16384;
 constexpr std::size_t kNoColumn = SIZE_MAX;
+constexpr double kAxisError = 1e-3;  // of the length of a unit vector that was rounded
 
 void split(std::string_view line, std::vector<std::string_view>& fields) {
   fields.clear();
@@ -55,7 +57,9 @@ class LogStates final : public StateRecord {
         return bad_input(file_ + ": line 1 has no column " + column.name +
                          "; give a log that osteon-haptic --session-log wrote");
     }
-    for (Column& column : optional_) column.at = find(column.name);
+    for (const std::span<Column> columns :
+         {std::span<Column>(optional_), std::span<Column>(tip_), std::span<Column>(axis_)})
+      for (Column& column : columns) column.at = find(column.name);
     return {};
   }
 
@@ -89,7 +93,7 @@ class LogStates final : public StateRecord {
     std::size_t at = kNoColumn;
   };
   enum Needed { kMonoNs, kPhase, kTool, kRpm, kFeed, kDensity, kForce, kTorque };
-  enum Optional { kSeq, kAuthor, kSuction, kTipX, kTipY, kTipZ, kCortex, kSeated, kBlows, kImpulse, kEngaged };
+  enum Optional { kSeq, kAuthor, kSuction, kCortex, kSeated, kBlows, kImpulse, kEngaged };
 
   [[nodiscard]] std::size_t find(std::string_view name) const {
     const auto found = std::ranges::find(columns_, name);
@@ -130,6 +134,19 @@ class LogStates final : public StateRecord {
     return nullptr;
   }
 
+  // As number(), of tip and axis. Where the axis is not known, the rotation is zero.
+  const Column* read_pose(Pose& pose) const {
+    Vec3 tip_mm = Vec3::Zero(), axis = Vec3::Zero();
+    for (Eigen::Index i = 0; i < 3; ++i) {
+      const auto at = static_cast<std::size_t>(i);
+      for (const Column* wrong : {number(tip_[at], tip_mm[i]), number(axis_[at], axis[i])})
+        if (wrong) return wrong;
+    }
+    const bool known = std::abs(axis.norm() - 1.0) < kAxisError;
+    pose = known ? pose_along(tip_mm, axis) : Pose{tip_mm, Eigen::Quaterniond(0, 0, 0, 0)};
+    return nullptr;
+  }
+
   Result<std::optional<CuttingState>> parsed() const {
     CuttingState state;
     const auto phase = phase_of(fields_[needed_[kPhase].at]);
@@ -141,16 +158,15 @@ class LogStates final : public StateRecord {
     state.engaged_fraction = 1;
     double force_n = 0;
     int suction = 0;
-    Vec3& tip = state.pose_bone_tool.position_mm;
     for (const Column* wrong :
          {number(needed_[kMonoNs], state.time_ns), number(needed_[kRpm], state.spindle_rpm),
           number(needed_[kFeed], state.feed_mm_per_s), number(needed_[kDensity], state.density_g_cm3),
           number(needed_[kForce], force_n), number(needed_[kTorque], state.torque_Nmm),
           number(optional_[kSeq], state.state_seq), number(optional_[kAuthor], state.author.value),
-          number(optional_[kSuction], suction), number(optional_[kTipX], tip.x()), number(optional_[kTipY], tip.y()),
-          number(optional_[kTipZ], tip.z()), number(optional_[kCortex], state.cortex_mm),
-          number(optional_[kSeated], state.seated), number(optional_[kBlows], state.blows),
-          number(optional_[kImpulse], state.blow_impulse_N_s), number(optional_[kEngaged], state.engaged_fraction)})
+          number(optional_[kSuction], suction), read_pose(state.pose_bone_tool),
+          number(optional_[kCortex], state.cortex_mm), number(optional_[kSeated], state.seated),
+          number(optional_[kBlows], state.blows), number(optional_[kImpulse], state.blow_impulse_N_s),
+          number(optional_[kEngaged], state.engaged_fraction)})
       if (wrong) return no_value(*wrong, "no number");
     // The log has the size of the force and not its direction, and the sound needs no more.
     state.force_physical_N = {0, 0, force_n};
@@ -175,17 +191,16 @@ class LogStates final : public StateRecord {
                                     {"force_physical_n"},
                                     {"torque_nmm"}}};
   // Logs of other versions may lack these.
-  std::array<Column, 11> optional_ = {{{"state_seq"},
-                                       {"author"},
-                                       {"suction"},
-                                       {"tip_x_mm"},
-                                       {"tip_y_mm"},
-                                       {"tip_z_mm"},
-                                       {"cortex_mm"},
-                                       {"seated"},
-                                       {"blows"},
-                                       {"blow_impulse_n_s"},
-                                       {"engaged"}}};
+  std::array<Column, 8> optional_ = {{{"state_seq"},
+                                      {"author"},
+                                      {"suction"},
+                                      {"cortex_mm"},
+                                      {"seated"},
+                                      {"blows"},
+                                      {"blow_impulse_n_s"},
+                                      {"engaged"}}};
+  std::array<Column, 3> tip_ = {{{"tip_x_mm"}, {"tip_y_mm"}, {"tip_z_mm"}}},
+                        axis_ = {{{"axis_x"}, {"axis_y"}, {"axis_z"}}};
 };
 
 }  // namespace

@@ -94,14 +94,17 @@ Result<OfflineSound> render_states(StateRecord& record, const SynthParams& param
   }
 }
 
-Result<Vec3> middle_of_work(StateRecord& record, const KeepGoing& keep_going) {
+Result<RecordedWork> survey(StateRecord& record, const KeepGoing& keep_going) {
   Vec3 all_mm = Vec3::Zero(), touching_mm = Vec3::Zero();
   std::uint64_t count = 0, touching = 0;
+  std::int64_t first_ns = 0, last_ns = 0;
   for (;; ++count) {
     if (count % kStatesPerReport == 0 && !keep_going(record.done())) return stopped_while("reading the session");
     const auto state = record.next();
     if (!state) return tl::unexpected(state.error());
     if (!*state) break;
+    last_ns = (*state)->time_ns;
+    if (count == 0) first_ns = last_ns;
     const Vec3& tip_mm = (*state)->pose_bone_tool.position_mm;
     all_mm += tip_mm;
     if ((*state)->phase != CuttingPhase::cutting && (*state)->phase != CuttingPhase::rubbing) continue;
@@ -109,7 +112,10 @@ Result<Vec3> middle_of_work(StateRecord& record, const KeepGoing& keep_going) {
     ++touching;
   }
   if (count == 0) return bad_input(record.name() + " holds no state; record a session");
-  return Vec3(touching > 0 ? touching_mm / static_cast<double>(touching) : all_mm / static_cast<double>(count));
+  RecordedWork work;
+  work.middle_mm = touching > 0 ? touching_mm / static_cast<double>(touching) : all_mm / static_cast<double>(count);
+  work.seconds = 1e-9 * static_cast<double>(last_ns - first_ns);
+  return work;
 }
 
 }  // namespace osteon::audio

@@ -25,8 +25,16 @@ using TakeFrames = std::function<Result<void>(std::span<const float> left, std::
 [[nodiscard]] Result<OfflineSound> render_states(StateRecord& record, const SynthParams& params, const TakeFrames& take,
                                                  const KeepGoing& keep_going);
 
-// Where the work was, for a listener who looks there: the mean place of the tip while it touched bone. If it never did,
-// of all states. Reads the whole record, which then has no further state. Errors: those of the record, and cancelled.
-[[nodiscard]] Result<Vec3> middle_of_work(StateRecord& record, const KeepGoing& keep_going);
+// By so much the sound is longer than its record: the tool runs down, and a buffer is filled.
+inline constexpr double kLongestTail_s = 2.1;
+
+struct RecordedWork {
+  Vec3 middle_mm = Vec3::Zero();  // the mean place of the tip while it touched bone; if it never did, of all states
+  double seconds = 0;             // from the first state to the last
+};
+
+// What must be known before the sound is made: where a listener looks, and how long it becomes. Reads the whole record,
+// which then has no further state. Errors: those of the record, and cancelled.
+[[nodiscard]] Result<RecordedWork> survey(StateRecord& record, const KeepGoing& keep_going);
 
 }  // namespace osteon::audio

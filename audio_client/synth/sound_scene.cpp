@@ -29,6 +29,18 @@ std::string_view lasting_name(std::string_view name) {
   return {};
 }
 
+bool fed_along_axis(ToolKind kind) {
+  return kind == ToolKind::drill || kind == ToolKind::end_drill || kind == ToolKind::sphere_reamer ||
+         kind == ToolKind::cylinder_reamer || kind == ToolKind::outside_reamer || kind == ToolKind::pin ||
+         kind == ToolKind::screw;
+}
+
+// Zero where a state does not know the rotation.
+Vec3 axis_of(const Pose& pose) {
+  const double norm = pose.rotation.norm();
+  return std::abs(norm - 1.0) < 1e-3 ? pose.direction(Vec3::UnitZ()) : Vec3(Vec3::Zero());
+}
+
 }  // namespace
 
 ToolSound tool_sound(const CuttingState& state) {
@@ -49,7 +61,8 @@ ToolSound tool_sound(const CuttingState& state) {
   sound.tip_mm = sound.stated_tip_mm = state.pose_bone_tool.position_mm;
   sound.depth_mm = state.depth_mm;
   sound.phase = state.phase;
-  sound.time_ns = state.time_ns;
+  sound.time_ns = sound.stated_ns = state.time_ns;
+  if (!tool || fed_along_axis(tool->kind)) sound.feed_axis = axis_of(state.pose_bone_tool);
 
   const bool contact = state.phase == CuttingPhase::cutting || state.phase == CuttingPhase::rubbing;
   if (!contact) return sound;

@@ -32,10 +32,13 @@ struct ToolSound {
   double blow_impulse_N_s = 0;
   Vec3 tip_mm = Vec3::Zero();  // of the tool, bone frame
   double depth_mm = 0;         // of the tip from its entry
-  // Two as the newest state has them, and not computed ahead: the tip, and the density under the cutting part times the
-  // share of it that is in bone.
+  // As the newest state has them, and not computed ahead: the tip, the state's time or 0, and the density under the
+  // cutting part times the share of it that is in bone.
   Vec3 stated_tip_mm = Vec3::Zero();
+  std::int64_t stated_ns = 0;
   double bone_g_cm3 = 0;
+  // Out of the tip, bone frame. Zero for a tool that is not fed along its axis, and where the axis is not known.
+  Vec3 feed_axis = Vec3::Zero();
   CuttingPhase phase = CuttingPhase::idle;
   std::int64_t time_ns = 0;  // of the state, by the clock of the tool's haptic client; 0: unknown
 };

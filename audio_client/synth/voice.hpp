@@ -73,9 +73,11 @@ class Voice {
   std::array<float, kBladeModes> blade_levels_{};
   float chip_level_ = 0, chip_to_ = 0, plate_level_ = 0, plate_to_ = 0, blade_level_ = 0, blade_to_ = 0;
 
-  double recent_load_ = 0, recent_bone_g_cm3_ = 0;           // fall slowly: those of a moment ago
-  Vec3 bone_tip_mm_ = Vec3::Zero(), way_mm_ = Vec3::Zero();  // the tip when it was in bone, and its last way there
-  double since_bone_s_ = 1;                                  // it was in none yet
+  double recent_load_ = 0, recent_bone_g_cm3_ = 0;  // fall slowly: those of a moment ago
+  // Of the last state with the tool in bone: its tip, its time or 0, and how long ago it was heard.
+  Vec3 bone_tip_mm_ = Vec3::Zero();
+  std::int64_t bone_ns_ = 0;
+  double since_bone_s_ = 1;  // it was in none yet
   ModalBank burst_, modes_;
   std::uint32_t blows_ = 0;
   std::size_t click_at_ = 0, click_ = 0;  // of a recorded click

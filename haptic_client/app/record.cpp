@@ -76,7 +76,7 @@ Result<void> SessionLog::open(const std::filesystem::path& file, const DeviceInf
     return failure(ErrorCode::internal, "the session log " + file.string() + " cannot be written; choose another path");
   file_ << "time_s,mono_ns,state_seq,phase,tool,tip_x_mm,tip_y_mm,tip_z_mm,depth_mm,device_depth_mm,force_physical_n,"
            "force_rendered_n,feed_mm_per_s,density_g_cm3,engaged,rpm,torque_nmm,law_out_of_range,author,suction,"
-           "cortex_mm,seated,blows,blow_impulse_n_s\n";
+           "cortex_mm,seated,blows,blow_impulse_n_s,axis_x,axis_y,axis_z\n";
   return {};
 }
 
@@ -85,18 +85,19 @@ void SessionLog::write(const TickRow& row, const std::string& tool) {
   if (first_mono_ns_ == 0) first_mono_ns_ = row.mono_ns;
   const LoopReport& r = row.report;
   const Vec3& tip = r.pose_bone_proxy.position_mm;
+  const Vec3 axis = r.pose_bone_proxy.direction(Vec3::UnitZ());
   const double rendered_n = shows_force_ ? row.force_rendered_n : 0.0;
   char line[512];
   const int size = std::snprintf(
       line, sizeof line,
       "%.3f,%lld,%llu,%s,%s,%.5f,%.5f,%.5f,%.5f,%.5f,%.4f,%.4f,%.5f,%.4f,%.4f,%.2f,%.3f,%u,%llu,%d,%.3f,%.4f,%u,"
-      "%.3f\n",
+      "%.3f,%.6f,%.6f,%.6f\n",
       1e-9 * static_cast<double>(row.mono_ns - first_mono_ns_), static_cast<long long>(row.mono_ns),
       static_cast<unsigned long long>(r.state_seq), name(r.cutting.phase), tool.c_str(), tip.x(), tip.y(), tip.z(),
       row.depth_mm, row.device_depth_mm, r.coupling.force_n.norm(), rendered_n, r.cutting.feed_mm_per_s,
       r.cutting.density_g_cm3, r.cutting.engaged, r.spindle_rpm, r.cutting.torque_nmm, r.cutting.out_of_range,
       static_cast<unsigned long long>(author_.value), (row.reading.buttons & kSuction) != 0, row.cortex_mm,
-      r.cutting.seated, r.cutting.blows, r.cutting.blow_impulse_n_s);
+      r.cutting.seated, r.cutting.blows, r.cutting.blow_impulse_n_s, axis.x(), axis.y(), axis.z());
   file_.write(line, size);
 }
 

@@ -122,7 +122,7 @@ class Hand {
     state.tool_name = d_.tool;
     state.time_ns = std::llround(1e9 * time_s);
     state.spindle_rpm = spindle_state_.rpm;
-    state.pose_bone_tool.position_mm = {0, 0, -tip_mm_};
+    state.pose_bone_tool = pose_along({0, 0, -tip_mm_}, -Vec3::UnitZ());
     if (state.phase != CuttingPhase::cutting) state.phase = state.spindle_rpm > 0 ? CuttingPhase::free : state.phase;
     const Shell& s = d_.shell;
     if (now.cortical > 0) state.cortex_mm = tip_mm_ < s.near_mm + s.between_mm ? s.near_mm : s.far_mm;

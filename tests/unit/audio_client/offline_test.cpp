@@ -140,9 +140,9 @@ TEST(OfflineSound, LooksAtTheMiddleOfTheWorkInBone) {
       states.back().pose_bone_tool.position_mm = tip_mm;
     }
     ListedStates record(states);
-    const auto middle_mm = middle_of_work(record, [](double) { return true; });
-    EXPECT_TRUE(middle_mm);
-    return *middle_mm;
+    const auto work = survey(record, [](double) { return true; });
+    EXPECT_TRUE(work);
+    return work->middle_mm;
   };
   using enum CuttingPhase;
   EXPECT_EQ(middle_of({{free, {500, 0, 0}}, {cutting, {1, 2, 3}}, {rubbing, {3, 6, 9}}, {idle, {0, 900, 0}}}),
@@ -207,7 +207,7 @@ TEST(StateRecord, ReadsWhatTheHapticClientWrites) {
     row.report.cutting.engaged = 0.75;
     row.report.cutting.torque_nmm = 16 + i % 4;
     row.report.coupling.force_n = {3.0, 4.0, 0.0};
-    row.report.pose_bone_proxy.position_mm = {1, 2, 3};
+    row.report.pose_bone_proxy = pose_along({1, 2, 3}, {0.6, 0, -0.8});
     if (i >= 100) row.reading.buttons = haptic::kSuction;
     return row;
   };
@@ -240,6 +240,9 @@ TEST(StateRecord, ReadsWhatTheHapticClientWrites) {
       ASSERT_EQ((*state)->torque_Nmm, expected.report.cutting.torque_nmm);
       ASSERT_EQ((*state)->force_physical_N.norm(), 5.0);
       ASSERT_EQ((*state)->pose_bone_tool.position_mm, Vec3(1, 2, 3));
+      // Along it a drill breaks through. A burr may do so in any direction.
+      const Vec3 axis = i >= 500 ? Vec3(0, 0, 0) : Vec3(0.6, 0, -0.8);
+      ASSERT_LT((tool_sound(**state).feed_axis - axis).norm(), 1e-5) << i;
       ASSERT_EQ((*state)->suction, i >= 100);
     }
     const auto end = (*record)->next();
@@ -251,6 +254,16 @@ TEST(StateRecord, ReadsWhatTheHapticClientWrites) {
 
 constexpr const char* kHeader =
     "mono_ns,phase,tool,rpm,feed_mm_per_s,density_g_cm3,force_physical_n,torque_nmm,author\n";
+
+TEST(StateRecord, KnowsNoAxisInATableWithoutIt) {
+  const test::TempDir temp;
+  ASSERT_TRUE(write_file(temp / "log.csv", kHeader + std::string("1000,free,drill-3.2,900,0,0,0,0,3\n")));
+  const auto record = open_states(temp / "log.csv");
+  ASSERT_TRUE(record) << record.error().message;
+  const auto state = (*record)->next();
+  ASSERT_TRUE(state && *state);
+  EXPECT_EQ(tool_sound(**state).feed_axis, Vec3(0, 0, 0));
+}
 
 // The sentence with which a table is refused.
 std::string refusal(const std::string& text) {
@@ -453,6 +466,33 @@ TEST(RenderCommand, SaysThatTheFileBecomesTooLarge) {
                              HasSubstr("an older file of that name is as it was")));
   EXPECT_EQ(*read_file(temp / "x.wav"), "an older sound");
   EXPECT_EQ(std::distance(std::filesystem::directory_iterator(temp.path()), {}), 2);
+}
+
+// Two states that are nearly 4 hours apart: 48 000 frames of 6 bytes a second are 4.15 GB. A limit of the shell stops
+// what begins to write.
+TEST(RenderCommand, RefusesASoundAboveFourGigabytesBeforeItIsMade) {
+  const test::TempDir temp;
+  const std::string state = ",free,drill-3.2,900,0,0,0,0,1\n";
+  ASSERT_TRUE(write_file(temp / "long.csv", kHeader + ("1" + state) + "14390000000001" + state));
+  ASSERT_TRUE(write_file(temp / "x.wav", "an older sound"));
+  const auto error = [&](std::vector<std::string> options) {
+    std::vector<std::string> arguments = {
+        "-c",     "ulimit -f 64 && exec \"$@\"", "render", test::program("osteon-audio").string(),
+        "render", (temp / "long.csv").string(),  "--out",  (temp / "x.wav").string()};
+    arguments.insert(arguments.end(), options.begin(), options.end());
+    const auto ran = test::run("bash", arguments);
+    EXPECT_EQ(ran.exit_code, 1);
+    EXPECT_EQ(*read_file(temp / "x.wav"), "an older sound");
+    EXPECT_EQ(std::distance(std::filesystem::directory_iterator(temp.path()), {}), 2);
+    return ran.err;
+  };
+  // 4 000 000 000 / 288 000 = 13 889 s, and the drill runs down for 2 s of them.
+  EXPECT_THAT(error({"--bits", "24"}),
+              AllOf(HasSubstr("long.csv lasts 240 minutes"), HasSubstr("4.1 GB"),
+                    HasSubstr("--bits 16, --listen mono, a lower"), HasSubstr("at most 231 minutes")));
+  EXPECT_THAT(error({"--listen", "mono", "--rate", "192000"}), HasSubstr("5.5 GB"));
+  for (const auto& fits : {std::vector<std::string>{"--bits", "16"}, {"--bits", "24", "--listen", "mono"}})
+    EXPECT_THAT(error(fits), HasSubstr("could not be written whole (File too large)"));
 }
 
 TEST(RenderCommand, TakesNoSeedThatItWouldChange) {

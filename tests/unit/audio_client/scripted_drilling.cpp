@@ -11,6 +11,7 @@ CuttingState drill(double rpm, CuttingPhase phase) {
   CuttingState state;
   state.author = AuthorId{1};
   state.tool_name = "drill-3.2";
+  state.pose_bone_tool = pose_along(Vec3::Zero(), -Vec3::UnitZ());
   state.spindle_rpm = rpm;
   state.phase = phase;
   return state;

@@ -277,6 +277,67 @@ TEST(DrillSound, DoesNotKnockWhenAStateLacksBoneOrForce) {
             knock_db);
 }
 
+// The largest level near 200 Hz while a tool is in the air. For a second before it was in bone as `in_bone` says. It
+// goes on by `step_mm` in each 1/120 s, there and in the air. Of the states in the air, the first `lost` do not come.
+double low_after_leaving_db(CuttingState in_bone, const Vec3& step_mm, int lost = 0) {
+  DrillSynth synth = make_synth(1, kPure);
+  CuttingState in_air = free_drill(in_bone.spindle_rpm);
+  in_air.tool_name = in_bone.tool_name;
+  std::vector<float> samples;
+  for (int i = 0; i < 150; ++i) {
+    CuttingState& state = i < 120 ? in_bone : in_air;
+    state.pose_bone_tool.position_mm = i * step_mm;
+    state.time_ns = 1'000'000'000 + std::llround(i * 1e9 / 120);
+    const bool comes = i < 120 || i >= 120 + lost;
+    const std::vector<float> part = play(synth, std::vector{comes ? state : in_bone});
+    if (i >= 120 + lost) samples.insert(samples.end(), part.begin(), part.end());
+  }
+  double most_db = sound::kSilence_db;
+  // The fall of the load itself takes 40 ms.
+  for (std::size_t from = 2000; from + 2048 <= samples.size(); from += 1024)
+    most_db = std::max(
+        most_db,
+        sound::band_db(sound::power_spectrum(std::span(samples).subspan(from, 2048), kRate_hz, 2048), 100, 300));
+  return most_db;
+}
+
+TEST(DrillSound, KnocksOnlyWhenItFallsOnAlongItsAxis) {
+  const auto leaves_db = [](const Vec3& mm_per_s, int lost = 0) {
+    return low_after_leaving_db(cortical_drill(1345), mm_per_s / 120, lost);
+  };
+  const double held_db = leaves_db({0, 0, 0});
+  for (const double mm_per_s : {25.0, 45.0, 300.0})
+    EXPECT_GT(leaves_db({0, 0, -mm_per_s}), held_db + 10) << mm_per_s << " mm/s deeper";
+  // A machine that feeds evenly goes on so in the air, and makes no knock, neither soon nor late.
+  for (const double mm_per_s : {2.0, 5.0, 10.0, 15.0})
+    EXPECT_LT(leaves_db({0, 0, -mm_per_s}), held_db + 1) << mm_per_s << " mm/s deeper";
+  EXPECT_LT(leaves_db({0, 0, -10}, 5), held_db + 1) << "0.5 mm farther, in the time of six states";
+  EXPECT_LT(leaves_db({0, 0, 30}), held_db + 1) << "drawn back";
+  EXPECT_LT(leaves_db({30, 0, 0}), held_db + 1) << "along the surface";
+  EXPECT_LT(leaves_db({30, 0, 5}), held_db + 1) << "along the surface, and lifted";
+}
+
+TEST(BurrSound, DoesNotKnockAtTheEndOfAStroke) {
+  CuttingState stroke = burr(40000, 1.9);
+  stroke.engaged_fraction = 0.2;
+  stroke.feed_mm_per_s = 30;
+  stroke.force_physical_N = Vec3(0, 0, 5);
+  stroke.torque_Nmm = 1;
+  const double held_db = low_after_leaving_db(stroke, Vec3::Zero());
+  for (const Vec3& mm_per_s : {Vec3(30, 0, 0), Vec3(0, 0, 30), Vec3(21, 0, 21), Vec3(0, 0, -30)})
+    EXPECT_LT(low_after_leaving_db(stroke, mm_per_s / 120), held_db + 1) << mm_per_s.transpose();
+
+  // The last of a layer gives way under a burr that still feeds.
+  DrillSynth synth = make_synth(1, kPure);
+  static_cast<void>(play(synth, stroke, 1.0));
+  stroke.engaged_fraction = 0.005;
+  stroke.force_physical_N = Vec3(0, 0, 0.1);
+  stroke.torque_Nmm = 0.02;
+  const std::vector<float> through = play(synth, stroke, 0.1);
+  EXPECT_GT(sound::band_db(sound::power_spectrum(std::span(through).subspan(2000, 2048), kRate_hz, 2048), 100, 300),
+            held_db + 20);
+}
+
 TEST(DrillSound, SilentAtRest) {
   DrillSynth synth = make_synth();
   EXPECT_TRUE(synth.silent());
