@@ -141,6 +141,7 @@ TEST(RiskGauge, ItsToolTipGoesOnWhileItIsRead) {
   ASSERT_TRUE(desk.stands()) << "Xvfb is needed; deploy/install installs it";
   QLocale::setDefault(QLocale::c());
   QWidget window;
+  window.setAttribute(Qt::WA_AlwaysShowToolTips);  // no window manager makes it the active window
   RiskGauge gauge(&window);
   gauge.set_plan(plan_with_plate());
   gauge.resize(300, 100);
