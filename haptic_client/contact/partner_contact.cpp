@@ -5,14 +5,14 @@
 
 namespace osteon::haptic {
 
-TouchPoints::TouchPoints(const ToolModel& model, int most) {
-  const std::vector<Vec3>& samples = model.skin_mm;
+TouchPoints::TouchPoints(const Tool& tool, int most) {
+  std::vector<SamplePoint> samples = sample_points(tool, std::max(1, most / 2));
   // Takes every n-th point where a long shank has many more than its cutting part; neighbours follow each other.
   const auto room = static_cast<std::size_t>(std::max(1, most));
   const std::size_t every = std::max<std::size_t>(1, (samples.size() + room - 1) / room);
   Box box;
   for (std::size_t i = 0; i < samples.size(); i += every) {
-    points_mm_.push_back(samples[i]);
+    points_mm_.push_back(samples[i].position_mm);
     if (i == 0) box = {points_mm_[0], points_mm_[0]};
     box.min_mm = box.min_mm.cwiseMin(points_mm_.back());
     box.max_mm = box.max_mm.cwiseMax(points_mm_.back());

@@ -15,15 +15,14 @@
 #include <vector>
 
 #include "haptic_client/contact/obstacle.hpp"
-#include "haptic_client/contact/tool_model.hpp"
 
 namespace osteon::haptic {
 
 // Points on the surface of the tool in hand. Made off the haptic thread.
 class TouchPoints {
  public:
-  // At most `most` of the tool's points, spread over all of it.
-  explicit TouchPoints(const ToolModel& model, int most = 400);
+  // At most about `most` points, spaced as widely as possible.
+  explicit TouchPoints(const Tool& tool, int most = 400);
   [[nodiscard]] std::span<const Vec3> points_mm() const noexcept { return points_mm_; }  // tool frame
   // A ball around all of them.
   [[nodiscard]] const Vec3& centre_mm() const noexcept { return centre_mm_; }

@@ -75,9 +75,8 @@ Implicit touching_solid(const Tool& tool) {
   return is_saw(tool.kind) ? unite(tool_solid(tool), cut_solid(tool)) : tool_solid(tool);
 }
 
-std::vector<SamplePoint> points_of(const Tool& tool, int count, std::vector<Vec3>& skin_mm) {
+std::vector<SamplePoint> points_of(const Tool& tool, int count) {
   std::vector<SamplePoint> points = sample_points(tool, count);
-  for (const SamplePoint& point : points) skin_mm.push_back(point.position_mm);
   if (!is_saw(tool.kind)) return points;
   std::erase_if(points, [](const SamplePoint& p) { return p.active; });
   const double forward_mm = tool.kind == ToolKind::reciprocating_saw ? 0.5 * tool.stroke_mm : 0.0;
@@ -146,7 +145,7 @@ ToolModel::ToolModel(const Tool& definition, double pitch_mm, double blunt, int 
   // A broach's sides face forward by their taper only, but they cut.
   const bool sides_cut = tool.kind == ToolKind::broach;
   if (sides_cut) least_facing = 0.5 * std::sin(tool.taper_rad);
-  for (const SamplePoint& p : points_of(tool, points > 0 ? points : points_for(tool, fine_pitch_mm), skin_mm)) {
+  for (const SamplePoint& p : points_of(tool, points > 0 ? points : points_for(tool, fine_pitch_mm))) {
     const double axis_mm = std::hypot(p.position_mm.x(), p.position_mm.y());
     // A screw's thread presses into the wall of its hole, which is its core: it does not hold the screw back.
     if (tool.kind == ToolKind::screw && p.position_mm.z() > -tool.cutting_length_mm &&

@@ -38,7 +38,6 @@ struct ToolModel {
   std::vector<ContactPoint> active;   // on the part that cuts
   std::vector<ContactPoint> passive;  // walls and shank: they only block
   ContactSet contact;                 // both, in the same order
-  std::vector<Vec3> skin_mm;          // points all over the tool as it is drawn, also where it does not touch bone
   DensityTable strength;              // milling_resistance() of 1 mm2 at 1 mm from the axis
   double active_area_mm2 = 0;
   double wear = 1.0;

@@ -382,7 +382,7 @@ Vec3 HapticLoop::cue_n(const LoopReport& report, double limit_n, bool safe) noex
 
 void HapticLoop::feel_partners() {
   touch_points_.clear();
-  for (const ToolModel& model : tools_) touch_points_.emplace_back(model);
+  for (const ToolModel& model : tools_) touch_points_.emplace_back(model.tool);
 }
 
 HapticLoop::Left HapticLoop::meet(const LoopInput& input, const Left& left, LoopReport& report) noexcept {

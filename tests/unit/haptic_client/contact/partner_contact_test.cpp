@@ -27,7 +27,7 @@ Pose facing(double tip_z_mm, double x_mm = 0.0) {
 
 struct Pair {
   Tool tool = burr();
-  TouchPoints own{ToolModel(tool, 0.4)};
+  TouchPoints own{tool};
   SolidLattice solid{tool};
   PartnerContact contact;
 
@@ -202,7 +202,7 @@ TEST(PartnerContact, DoesNotAllocate) {
 // Every tool has points at which it can be touched, few enough for a tick.
 TEST(TouchPoints, AreOnTheToolAndNotTooMany) {
   for (const Tool& tool : builtin_tools()) {
-    const TouchPoints touch(ToolModel(tool, 0.4), 400);
+    const TouchPoints touch(tool, 400);
     EXPECT_GE(touch.points_mm().size(), 20u) << tool.name;
     EXPECT_LE(touch.points_mm().size(), 400u) << tool.name;
     for (const Vec3& p : touch.points_mm()) {
