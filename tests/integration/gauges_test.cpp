@@ -4,6 +4,7 @@
 
 #include <QAction>
 #include <QComboBox>
+#include <QCursor>
 #include <QDoubleSpinBox>
 #include <QLabel>
 #include <QLocale>
@@ -149,8 +150,10 @@ TEST(RiskGauge, ItsToolTipGoesOnWhileItIsRead) {
   gauge.show_tools(std::vector{tool_at("drill-3.2", 40.0, "")});
   window.show();
   ASSERT_TRUE(QTest::qWaitForWindowExposed(&window));
-  QTest::mouseMove(window.windowHandle(), QPoint(50, 50));
-  QTest::mouseMove(window.windowHandle(), QPoint(51, 50));
+  // The screen's own pointer: an event alone would not put the label under it.
+  QCursor::setPos(gauge.mapToGlobal(QPoint(50, 50)));
+  ASSERT_TRUE(QTest::qWaitFor([&] { return gauge.underMouse(); }, 10000));
+  QCursor::setPos(gauge.mapToGlobal(QPoint(51, 50)));
   ASSERT_TRUE(QTest::qWaitFor([] { return QToolTip::isVisible(); }, 10000));
   ASSERT_TRUE(QToolTip::text().endsWith("40.0 mm"));
   gauge.show_tools(std::vector{tool_at("drill-3.2", 39.0, "")});
