@@ -8,7 +8,6 @@
 #include <cstdint>
 #include <cstdio>
 #include <memory>
-#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -19,8 +18,8 @@
 #include "audio_client/app/recording_option.hpp"
 #include "audio_client/offline/offline_sound.hpp"
 #include "audio_client/offline/state_record.hpp"
-#include "common/runtime/progress.hpp"
 #include "common/runtime/stop_signal.hpp"
+#include "common/runtime/stoppable_progress.hpp"
 #include "common/sound/levels.hpp"
 #include "common/sound/wav_writer.hpp"
 
@@ -50,22 +49,6 @@ std::string summary(const RenderArguments& a, const OfflineSound& sound, const s
   return text.data() + (note.empty() ? "" : "note       " + note + "\n") + "written    " + a.out + "\n";
 }
 
-// A bar that appears with the first work, so that a refused record prints only its sentence.
-class Work {
- public:
-  Work(const StopSignal& stop, const char* what) : stop_(stop), what_(what) {}
-  bool go_on(double done) {
-    if (done > 0 && !bar_) bar_.emplace(what_);
-    if (bar_) bar_->update(done);
-    return !stop_.requested();
-  }
-
- private:
-  const StopSignal& stop_;
-  const char* what_;
-  std::optional<Progress> bar_;
-};
-
 int channels_of(const Space& space) { return space.listening == Listening::mono ? 1 : 2; }
 
 // Of the sound that a record of that length becomes.
@@ -93,8 +76,8 @@ Result<void> read_ahead(const RenderArguments& a, Space& space, const StopSignal
   if (space.listening == Listening::mono && bytes_of(a, space, kLongestSession_s) <= kMost) return {};
   auto states = open_states(a.record);
   if (!states) return tl::unexpected(states.error());
-  Work work(stop, "reading the session");
-  const auto recorded = survey(**states, [&](double done) { return work.go_on(done); });
+  StoppableProgress progress(stop, "reading the session");
+  const auto recorded = survey(**states, [&](double done) { return progress.go_on(done); });
   if (!recorded) return tl::unexpected(recorded.error());
   move_to_middle(space, recorded->middle_mm);
   return check_size(a, space, recorded->seconds);
@@ -128,8 +111,8 @@ Result<OfflineSound> write_sound(StateRecord& record, const SynthParams& params,
     for (std::size_t i = 0; i < left.size(); ++i) both.insert(both.end(), {left[i], right[i]});
     return writer.write(both);
   };
-  Work work(stop, "making the sound");
-  return render_states(record, params, take, [&](double done) { return work.go_on(done); });
+  StoppableProgress progress(stop, "making the sound");
+  return render_states(record, params, take, [&](double done) { return progress.go_on(done); });
 }
 
 Result<std::string> run_render(const RenderArguments& a) {

@@ -1,12 +1,11 @@
 // The common part of the commands of osteon-import: how they are found, run, shown and stopped.
 #pragma once
 #include <functional>
-#include <optional>
 #include <string>
 #include <vector>
 
-#include "common/runtime/progress.hpp"
 #include "common/runtime/stop_signal.hpp"
+#include "common/runtime/stoppable_progress.hpp"
 #include "common/volume/case.hpp"
 #include "common/volume/case_scan.hpp"
 #include "common/volume/iso_surface.hpp"
@@ -30,24 +29,16 @@ void add_subvolume_command(CLI::App& app, std::vector<Command>& commands);
 void add_phantom_command(CLI::App& app, std::vector<Command>& commands);
 void add_bone_commands(CLI::App& app, std::vector<Command>& commands);  // work on a case's bone, and list the tools
 
-// One progress bar over all stages. It appears when the first work is done, so a refused input prints only its
-// sentence.
+// One progress bar over all stages.
 class Bar {
  public:
-  explicit Bar(const StopSignal& stop, const char* what = "importing") : stop_(stop), what_(what) {}
+  explicit Bar(const StopSignal& stop, const char* what = "importing") : progress_(stop, what) {}
   [[nodiscard]] KeepGoing stage(double begin, double end) {
-    return [this, begin, end](double fraction) {
-      const double done = begin + (end - begin) * fraction;
-      if (done > 0.0 && !bar_) bar_.emplace(what_);
-      if (bar_) bar_->update(done);
-      return !stop_.requested();
-    };
+    return [this, begin, end](double fraction) { return progress_.go_on(begin + (end - begin) * fraction); };
   }
 
  private:
-  const StopSignal& stop_;
-  const char* what_;
-  std::optional<Progress> bar_;
+  StoppableProgress progress_;
 };
 
 [[nodiscard]] inline Error stopped() { return {ErrorCode::cancelled, "stopped; nothing was written"}; }
