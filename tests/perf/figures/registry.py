@@ -158,6 +158,9 @@ FIGURES = [
            "those rendered that did not come out", "sound_output", ("==", 0), full=True),
     Figure("sound_output_share", "ratio", "most processor time of the callback's thread from one call to the next, "
            "over the duration of a buffer", "sound_output", ("<=", 0.5), baseline="99th percentile", full=True),
+    Figure("sound_output_share_without_stall", "ratio", "the most of those calls during which no processor stood "
+           "still for 1.5 ms or more", "sound_output", ("<=", 0.5),
+           baseline="part of the calls that this leaves out", full=True),
     Figure("sound_output_allocations", "count", "allocations in the callback", "sound_output", ("==", 0),
            baseline="in its thread, with those of RtAudio and libpulse", full=True),
     Figure("sound_latency_p50", "ms", "from the server's acceptance of a cut to its first changed sample on the "

@@ -134,13 +134,15 @@ def gapless(run):
     found = played(run, "sound_output", "gapless", GAPLESS_MINUTES, "--listen", "headphones", "--awake")
     if not found:
         return {f"sound_output_{name}": Measured(None)
-                for name in ("compared", "gaps", "gaps_without_stall", "differing", "share", "allocations")}
+                for name in ("compared", "gaps", "gaps_without_stall", "differing", "share", "share_without_stall",
+                             "allocations")}
     run.tables.append(("output of the sound", [(name, found[name]) for name in sorted(found)]))
     return {"sound_output_compared": Measured(found["seconds_equal"] / (60 * GAPLESS_MINUTES)),
             "sound_output_gaps": Measured(found["gaps"], found["gaps_by_clock"]),
             "sound_output_gaps_without_stall": Measured(found["gaps_without_stall"], found["stalls"]),
             "sound_output_differing": Measured(found["differing_frames"] + found["missing_frames"]),
             "sound_output_share": Measured(found["share_max"], found["share_p99"]),
+            "sound_output_share_without_stall": Measured(found["share_max_without_stall"], found["disturbed"]),
             "sound_output_allocations": Measured(found["allocations"], found["allocations_of_thread"])}
 
 

@@ -19,7 +19,8 @@ namespace {
 using namespace std::chrono_literals;
 using Clock = std::chrono::steady_clock;
 
-constexpr double kHalf = 0.5;  // of a period, the most that the thread may work
+constexpr double kHalf = 0.5;        // of a period, the most that the thread may work
+constexpr double kLongStall_ms = 5;  // shorter ones are no reason for a gap: the buffers hold more
 
 // A drilling that never rests, again and again. It moves round the listener, at 60 states a second as a haptic client
 // sends them.
@@ -55,9 +56,29 @@ std::size_t unexplained(const FrameComparison& heard, const Monitor& monitor, co
   constexpr std::int64_t kSoon_ns = 60'000'000;
   return static_cast<std::size_t>(std::ranges::count_if(heard.gaps, [&](std::size_t frame) {
     const std::int64_t at_ns = monitor.arrival_ns(frame);
-    return std::ranges::none_of(
-        stalls, [&](const Stall& stall) { return stall.from_ns <= at_ns && at_ns < stall.to_ns + kSoon_ns; });
+    return std::ranges::none_of(stalls, [&](const Stall& stall) {
+      return stall.ms() >= kLongStall_ms && stall.from_ns <= at_ns && at_ns < stall.to_ns + kSoon_ns;
+    });
   }));
+}
+
+using ThreadUse = MeasuredSource::ThreadUse;
+
+std::vector<double> sorted_shares(const std::vector<ThreadUse>& uses) {
+  std::vector<double> shares;
+  for (const ThreadUse& use : uses) shares.push_back(use.share);
+  std::ranges::sort(shares);
+  return shares;
+}
+
+// Without those uses during which a processor stood still, if only for a short time.
+std::vector<ThreadUse> undisturbed(std::vector<ThreadUse> uses, const std::vector<Stall>& stalls) {
+  std::erase_if(uses, [&](const ThreadUse& use) {
+    return std::ranges::any_of(stalls, [&](const Stall& stall) {
+      return stall.from_ns - MachineWatch::kLook_ns <= use.to_ns && use.from_ns <= stall.to_ns;
+    });
+  });
+  return uses;
 }
 
 double longest_ms(const std::vector<Stall>& stalls) {
@@ -92,8 +113,8 @@ Result<nlohmann::json> play_without_gaps(const OutputTrial& trial) {
   const double stolen_s = machine.stolen_s();
 
   const FrameComparison heard = compare(source.frames(), (*monitor)->frames());
-  std::vector<double> shares = source.shares();
-  std::ranges::sort(shares);
+  const std::vector<ThreadUse> uses = source.thread_uses();
+  const std::vector<double> shares = sorted_shares(uses), own_shares = sorted_shares(undisturbed(uses, stalls));
   const SinkFacts sink = (*monitor)->sink();
   nlohmann::json found = described(trial);
   found.update({{"sink_keeps_samples", sink.float_48k_stereo && sink.full_volume},
@@ -101,7 +122,7 @@ Result<nlohmann::json> play_without_gaps(const OutputTrial& trial) {
                 {"seconds_equal", static_cast<double>(heard.equal) / kOutputRate_hz},
                 {"gaps", heard.gaps.size()},
                 {"gaps_without_stall", unexplained(heard, **monitor, stalls)},
-                {"stalls", stalls.size()},
+                {"stalls", std::ranges::count_if(stalls, [](const Stall& one) { return one.ms() >= kLongStall_ms; })},
                 {"longest_stall_ms", longest_ms(stalls)},
                 {"stolen_s", stolen_s},
                 {"silent_frames", heard.silent},
@@ -116,6 +137,8 @@ Result<nlohmann::json> play_without_gaps(const OutputTrial& trial) {
                 {"share_p50", percentile(shares, 50)},
                 {"share_p99", percentile(shares, 99)},
                 {"share_max", percentile(shares, 100)},
+                {"share_max_without_stall", percentile(own_shares, 100)},
+                {"disturbed", 1 - static_cast<double>(own_shares.size()) / static_cast<double>(shares.size())},
                 {"above_half", std::ranges::count_if(shares, [](double share) { return share > kHalf; })},
                 {"allocations", source.allocations()},
                 {"allocations_of_thread", source.allocations_of_thread()}});

@@ -13,7 +13,6 @@
 namespace osteon::test {
 namespace {
 
-constexpr std::int64_t kLook_ns = 2'000'000;
 constexpr int kAboveAll = 90;
 
 void run_on(unsigned processor, int policy, int priority) {

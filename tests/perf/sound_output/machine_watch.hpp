@@ -24,10 +24,11 @@ struct Stall {
   [[nodiscard]] double ms() const noexcept { return 1e-6 * static_cast<double>(to_ns - from_ns); }
 };
 
-// Looks for stalls, on each processor every 2 ms.
+// Looks for stalls, on each processor every millisecond. A stall begins up to a millisecond before `from_ns`.
 class MachineWatch {
  public:
-  static constexpr double kLeast_ms = 5;
+  static constexpr double kLeast_ms = 1.5;
+  static constexpr std::int64_t kLook_ns = 1'000'000;
 
   MachineWatch();
   ~MachineWatch();

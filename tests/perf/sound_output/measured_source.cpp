@@ -10,9 +10,9 @@ namespace {
 
 constexpr std::size_t kLeastCall_frames = 32;
 
-std::int64_t thread_cpu_ns() noexcept {
+std::int64_t now_ns(clockid_t clock) noexcept {
   timespec time{};
-  ::clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
+  ::clock_gettime(clock, &time);
   return 1'000'000'000LL * time.tv_sec + time.tv_nsec;
 }
 
@@ -22,7 +22,9 @@ MeasuredSource::MeasuredSource(audio::SoundSource& engine, std::size_t most_fram
     : engine_(engine), frames_(most_frames), calls_(most_frames / kLeastCall_frames) {}
 
 void MeasuredSource::render(std::span<float> left, std::span<float> right) noexcept {
-  if (call_count_ < calls_.size()) calls_[call_count_++] = {thread_cpu_ns(), static_cast<std::uint32_t>(left.size())};
+  if (call_count_ < calls_.size())
+    calls_[call_count_++] = {now_ns(CLOCK_MONOTONIC), now_ns(CLOCK_THREAD_CPUTIME_ID),
+                             static_cast<std::uint32_t>(left.size())};
   if (!of_thread_) {
     of_thread_.emplace();
     const int policy = ::sched_getscheduler(0) & ~SCHED_RESET_ON_FORK;
@@ -37,13 +39,14 @@ void MeasuredSource::render(std::span<float> left, std::span<float> right) noexc
   frame_count_ += kept;
 }
 
-std::vector<double> MeasuredSource::shares() const {
-  std::vector<double> shares;
+std::vector<MeasuredSource::ThreadUse> MeasuredSource::thread_uses() const {
+  std::vector<ThreadUse> uses;
   for (std::size_t i = 1; i < call_count_; ++i) {
     const Call &call = calls_[i - 1], &next = calls_[i];
-    shares.push_back(1e-9 * static_cast<double>(next.begin_cpu_ns - call.begin_cpu_ns) * 48000.0 / call.frames);
+    uses.push_back({call.begin_ns, next.begin_ns,
+                    1e-9 * static_cast<double>(next.begin_cpu_ns - call.begin_cpu_ns) * 48000.0 / call.frames});
   }
-  return shares;
+  return uses;
 }
 
 }  // namespace osteon::test

@@ -23,15 +23,19 @@ class MeasuredSource final : public audio::SoundSource {
   // From here on, after the output was stopped.
   [[nodiscard]] std::span<const Frame> frames() const noexcept { return std::span(frames_).first(frame_count_); }
   // Processor time of the thread from one call to the next: this callback, and what the output does with its frames. As
-  // a share of the duration of those frames.
-  [[nodiscard]] std::vector<double> shares() const;
+  // a share of the duration of those frames. A virtual machine counts the time that its host took from the thread, too.
+  struct ThreadUse {
+    std::int64_t from_ns = 0, to_ns = 0;  // steady clock
+    double share = 0;
+  };
+  [[nodiscard]] std::vector<ThreadUse> thread_uses() const;
   [[nodiscard]] std::int64_t allocations() const noexcept { return allocations_; }                   // of the callback
   [[nodiscard]] std::int64_t allocations_of_thread() const noexcept { return thread_allocations_; }  // since its start
   [[nodiscard]] bool is_realtime() const noexcept { return is_realtime_; }
 
  private:
   struct Call {
-    std::int64_t begin_cpu_ns = 0;
+    std::int64_t begin_ns = 0, begin_cpu_ns = 0;
     std::uint32_t frames = 0;
   };
 
