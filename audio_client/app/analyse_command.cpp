@@ -13,6 +13,7 @@
 #include "audio_client/analysis/analysis_report.hpp"
 #include "audio_client/analysis/displacement_file.hpp"
 #include "audio_client/app/recording_option.hpp"
+#include "common/runtime/number_option.hpp"
 #include "common/runtime/stop_signal.hpp"
 
 namespace osteon::audio {

@@ -39,6 +39,7 @@
 #include "common/runtime/command_line.hpp"
 #include "common/runtime/files.hpp"
 #include "common/runtime/log.hpp"
+#include "common/runtime/number_option.hpp"
 #include "common/runtime/stop_signal.hpp"
 #include "common/wire/room_client.hpp"
 
@@ -374,7 +375,7 @@ int main(int argc, char** argv) {
                  "Socket of the window osteon, which starts this program by itself: the window sets the volume and "
                  "shows the sound. A missing sound server is then waited for");
   app.add_option("--timeout", options.patience_s, "Seconds to wait for the server")
-      ->check(CLI::Range(0.0, 3600.0))
+      ->check(number_in(0.0, 3600.0))
       ->capture_default_str();
   if (const auto code = parse_arguments(app, argc, argv)) return *code;
   if (command) {
