@@ -8,6 +8,7 @@
 #include <chrono>
 #include <cmath>
 #include <cstdio>
+#include <exception>
 #include <filesystem>
 #include <fstream>
 #include <functional>
@@ -343,7 +344,7 @@ Result<void> run(const Options& options, Prepared prepared, const StopSignal& st
 
 }  // namespace
 
-int main(int argc, char** argv) {
+int main(int argc, char** argv) try {
   Options options;
   CLI::App app("Plays the sound of a room's tools: it follows speed, load and bone density.", kProgram);
   std::function<Result<std::string>()> command;
@@ -396,4 +397,8 @@ int main(int argc, char** argv) {
   const StopSignal stop(StopSignal::HangUp::stops);
   const Result<void> outcome = run(options, std::move(*prepared), stop);
   return outcome ? 0 : log::exit_with(kProgram, outcome.error());
+} catch (const std::exception& fault) {
+  return log::exit_with(kProgram,
+                        {ErrorCode::internal, std::string("cannot go on: ") + fault.what() +
+                                                  "; free memory if it is short, or report a fault of Osteon"});
 }
