@@ -253,19 +253,27 @@ std::vector<NamedTable> tables_of(const SoundAnalysis& a, std::span<const Displa
 }
 
 Result<void> write_analysis(const SoundAnalysis& analysis, std::span<const DisplacementRow> displacement,
-                            const fs::path& folder) {
+                            const fs::path& folder, const KeepGoing& keep_going) {
   return write_new_folder(folder, [&](const fs::path& partial) -> Result<void> {
-    if (auto written = write_file(partial / "analysis.json", to_json(analysis)); !written) return written;
-    for (const NamedTable& table : tables_of(analysis, displacement))
-      if (auto written = write_file(partial / table.file, table.text); !written) return written;
-    for (const NamedPicture& of : pictures_of(analysis, displacement)) {
+    const std::vector<NamedTable> tables = tables_of(analysis, displacement);
+    const std::vector<NamedPicture> pictures = pictures_of(analysis, displacement);
+    const auto files = static_cast<double>(1 + tables.size() + pictures.size() + (analysis.difference ? 1 : 0));
+    double done = 0.0;
+    const auto counted = [&](Result<void> written) -> Result<void> {
+      if (written && !keep_going(++done / files)) return stopped_while("writing " + folder.string());
+      return written;
+    };
+    if (auto written = counted(write_file(partial / "analysis.json", to_json(analysis))); !written) return written;
+    for (const NamedTable& table : tables)
+      if (auto written = counted(write_file(partial / table.file, table.text)); !written) return written;
+    for (const NamedPicture& of : pictures) {
       const auto png = of.picture.png();
       if (!png) return tl::unexpected(png.error());
-      if (auto written = write_file(partial / of.file, *png); !written) return written;
+      if (auto written = counted(write_file(partial / of.file, *png)); !written) return written;
     }
     if (!analysis.difference) return {};
-    return sound::write_wav(partial / "difference.wav", analysis.difference->samples,
-                            static_cast<int>(analysis.rate_hz));
+    return counted(
+        sound::write_wav(partial / "difference.wav", analysis.difference->samples, static_cast<int>(analysis.rate_hz)));
   });
 }
 

@@ -7,6 +7,7 @@
 
 #include "audio_client/analysis/analysis.hpp"
 #include "audio_client/analysis/displacement_file.hpp"
+#include "common/core/keep_going.hpp"
 #include "common/core/result.hpp"
 
 namespace osteon::audio {
@@ -25,8 +26,8 @@ struct NamedTable {
                                                 std::span<const DisplacementRow> displacement);
 
 // Makes `folder` with analysis.json, the tables, the pictures, and difference.wav if there is a difference: as a whole
-// or not at all. Errors: exists, internal (disk).
+// or not at all. `keep_going` is called after each file. Errors: exists, internal (disk), cancelled.
 [[nodiscard]] Result<void> write_analysis(const SoundAnalysis& analysis, std::span<const DisplacementRow> displacement,
-                                          const std::filesystem::path& folder);
+                                          const std::filesystem::path& folder, const KeepGoing& keep_going);
 
 }  // namespace osteon::audio

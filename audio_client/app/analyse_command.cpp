@@ -13,6 +13,8 @@
 #include "audio_client/analysis/analysis_report.hpp"
 #include "audio_client/analysis/displacement_file.hpp"
 #include "audio_client/app/recording_option.hpp"
+#include "common/runtime/number_option.hpp"
+#include "common/runtime/stop_signal.hpp"
 
 namespace osteon::audio {
 namespace {
@@ -77,7 +79,12 @@ Result<std::string> run_analysis(const AnalyseArguments& a) {
                 work_s, recording->seconds() / work_s);
   std::string text = to_text(analysis) + speed.data();
   if (a.out.empty()) return text;
-  if (auto written = write_analysis(analysis, *displacement, a.out); !written) return tl::unexpected(written.error());
+  // Until here nothing is on the disk, and a signal ends the program at once.
+  const StopSignal stop(StopSignal::HangUp::stops);
+  const auto written = write_analysis(analysis, *displacement, a.out, [&](double) { return !stop.requested(); });
+  if (!written && written.error().code == ErrorCode::cancelled)
+    return failure(ErrorCode::cancelled, "stopped; " + a.out + " was not written");
+  if (!written) return tl::unexpected(written.error());
   return text + "written    " + a.out + ": analysis.json, tables (*.csv) and pictures (*.png)\n";
 }
 

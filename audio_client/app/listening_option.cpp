@@ -4,8 +4,8 @@
 #include <memory>
 #include <utility>
 
-#include "audio_client/app/recording_option.hpp"
 #include "audio_client/space/sofa_file.hpp"
+#include "common/runtime/number_option.hpp"
 
 namespace osteon::audio {
 

@@ -8,6 +8,7 @@
 #include <chrono>
 #include <cmath>
 #include <cstdio>
+#include <exception>
 #include <filesystem>
 #include <fstream>
 #include <functional>
@@ -39,6 +40,7 @@
 #include "common/runtime/command_line.hpp"
 #include "common/runtime/files.hpp"
 #include "common/runtime/log.hpp"
+#include "common/runtime/number_option.hpp"
 #include "common/runtime/stop_signal.hpp"
 #include "common/wire/room_client.hpp"
 
@@ -342,7 +344,7 @@ Result<void> run(const Options& options, Prepared prepared, const StopSignal& st
 
 }  // namespace
 
-int main(int argc, char** argv) {
+int main(int argc, char** argv) try {
   Options options;
   CLI::App app("Plays the sound of a room's tools: it follows speed, load and bone density.", kProgram);
   std::function<Result<std::string>()> command;
@@ -374,7 +376,7 @@ int main(int argc, char** argv) {
                  "Socket of the window osteon, which starts this program by itself: the window sets the volume and "
                  "shows the sound. A missing sound server is then waited for");
   app.add_option("--timeout", options.patience_s, "Seconds to wait for the server")
-      ->check(CLI::Range(0.0, 3600.0))
+      ->check(number_in(0.0, 3600.0))
       ->capture_default_str();
   if (const auto code = parse_arguments(app, argc, argv)) return *code;
   if (command) {
@@ -395,4 +397,8 @@ int main(int argc, char** argv) {
   const StopSignal stop(StopSignal::HangUp::stops);
   const Result<void> outcome = run(options, std::move(*prepared), stop);
   return outcome ? 0 : log::exit_with(kProgram, outcome.error());
+} catch (const std::exception& fault) {
+  return log::exit_with(kProgram,
+                        {ErrorCode::internal, std::string("cannot go on: ") + fault.what() +
+                                                  "; free memory if it is short, or report a fault of Osteon"});
 }

@@ -13,6 +13,7 @@
 #include "audio_client/presets/recorded_preset.hpp"
 #include "common/core/bounded_text.hpp"
 #include "common/runtime/files.hpp"
+#include "common/runtime/number_option.hpp"
 #include "common/tools/tool.hpp"
 #include "common/tools/tool_file.hpp"
 

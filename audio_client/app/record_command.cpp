@@ -14,9 +14,9 @@
 #include <optional>
 
 #include "audio_client/app/output_file.hpp"
-#include "audio_client/app/recording_option.hpp"
 #include "audio_client/capture/level_meter.hpp"
 #include "audio_client/capture/sound_input.hpp"
+#include "common/runtime/number_option.hpp"
 #include "common/runtime/stop_signal.hpp"
 #include "common/sound/wav_writer.hpp"
 

@@ -1,22 +1,12 @@
 #include "audio_client/app/recording_option.hpp"
 
-#include <cmath>
 #include <cstdint>
-#include <cstdlib>
 
 #include "common/core/bounded_text.hpp"
 #include "common/core/read_number.hpp"
+#include "common/runtime/number_option.hpp"
 
 namespace osteon::audio {
-
-CLI::Validator number_in(double least, double most) {
-  const CLI::Validator finite(
-      [](const std::string& text) {
-        return std::isfinite(std::strtod(text.c_str(), nullptr)) ? std::string() : text + " is no finite number";
-      },
-      "");
-  return finite & CLI::Range(least, most);
-}
 
 CLI::Validator whole_number() {
   return {[](const std::string& text) {

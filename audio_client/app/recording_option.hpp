@@ -15,9 +15,6 @@ struct RecordingOption {
   std::optional<double> to_s;
 };
 
-// CLI::Range, which lets "nan" pass, for numbers.
-[[nodiscard]] CLI::Validator number_in(double least, double most);
-
 // A number without a sign, at most 2^64 - 1. CLI11 takes -1 for the largest one.
 [[nodiscard]] CLI::Validator whole_number();
 

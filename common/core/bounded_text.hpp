@@ -8,8 +8,9 @@ namespace osteon {
 
 inline constexpr std::size_t kMostErrorBytes = 4096;
 
-// The text with a space for each control character. So it stays one line and does nothing to a terminal. A text longer
-// than `most` bytes ends in " ...", and no UTF-8 character is split.
+// The text with a space for each byte of a control character, and "?" for each byte that belongs to no UTF-8 character.
+// So it stays one line, does nothing to a terminal, and fits into JSON. A text longer than `most` bytes ends in " ...",
+// and no character is split.
 [[nodiscard]] std::string bounded_text(std::string_view text, std::size_t most = kMostErrorBytes);
 
 // The text for people elsewhere. Each path is reduced to its last name, and the process id in the name of a file being

@@ -11,6 +11,7 @@
 #include <limits>
 #include <numbers>
 #include <optional>
+#include <span>
 #include <sstream>
 
 #include "common/tools/tool_rules.hpp"
@@ -113,6 +114,22 @@ std::string kinds_sentence() {
   return all;
 }
 
+std::string name_in_file(const FieldRule& rule) {
+  return rule.name.ends_with("_rad") ? in_degrees(rule.name) : std::string(rule.name);
+}
+
+Fault unknown_field(const std::string& field, const std::string& kind, const Tool& tool,
+                    std::span<const FieldRule> rules) {
+  std::string names;
+  for (const FieldRule& rule : rules) names += (names.empty() ? "" : ", ") + name_in_file(rule);
+  return {"\"" + field + "\" is not a field of a " + kind + "; remove it or choose one of name, title, kind, " + names +
+          (tool.cuts() ? ", cut_level, law" : "")};
+}
+
+Fault missing_field(const FieldRule& rule, const std::string& kind) {
+  return {"\"" + name_in_file(rule) + "\" is missing; the kind " + kind + " needs it, " + limits_sentence(rule)};
+}
+
 Tool read(const YAML::Node& root, const MeshLoader& load_mesh) {
   if (!root.IsMap()) throw Fault{"it must be a list of \"field: value\" lines"};
   if (!root["kind"]) throw Fault{"\"kind\" is missing; choose one of " + kinds_sentence()};
@@ -162,23 +179,14 @@ Tool read(const YAML::Node& root, const MeshLoader& load_mesh) {
     const auto rule = std::ranges::find_if(rules, [&](const FieldRule& r) {
       return r.name == field || (r.name.ends_with("_rad") && in_degrees(r.name) == field);
     });
-    if (rule == rules.end()) {
-      std::string names;
-      for (const FieldRule& r : rules)
-        names += (names.empty() ? "" : ", ") + (r.name.ends_with("_rad") ? in_degrees(r.name) : std::string(r.name));
-      throw Fault{"\"" + field + "\" is not a field of a " + kind + "; remove it or choose one of name, title, kind, " +
-                  names + (tool.cuts() ? ", cut_level, law" : "")};
-    }
+    if (rule == rules.end()) throw unknown_field(field, kind, tool, rules);
     if (std::ranges::find(given, &*rule) != given.end()) throw Fault{"\"" + field + "\" is there twice; remove one"};
     const bool degrees = field != rule->name;
     set_field(tool, *rule, number(entry.second, field) * (degrees ? kRadPerDegree : 1.0));
     given.push_back(&*rule);
   }
   for (const FieldRule& rule : rules)
-    if (rule.required && std::ranges::find(given, &rule) == given.end()) {
-      const std::string field = rule.name.ends_with("_rad") ? in_degrees(rule.name) : std::string(rule.name);
-      throw Fault{"\"" + field + "\" is missing; the kind " + kind + " needs it, " + limits_sentence(rule)};
-    }
+    if (rule.required && std::ranges::find(given, &rule) == given.end()) throw missing_field(rule, kind);
   if (tool.cuts() && !has_level)
     throw Fault{"\"cut_level\" is missing; choose 0 for large cutters, 2 for small ones and blades"};
   if (tool.kind == ToolKind::mesh && !tool.mesh) {

@@ -164,7 +164,7 @@ Implicit without_openings(const Tool& guide, Implicit body) {
   return body;
 }
 
-Implicit sampled_solid(std::shared_ptr<const SampledDistance> mesh) {
+Implicit sampled_solid(const std::shared_ptr<const SampledDistance>& mesh) {
   const double pitch = mesh->pitch * kQuantum_mm;
   const Box box{position_mm(mesh->box.min, pitch), position_mm(mesh->box.max, pitch)};
   // Trilinear inside the lattice. Outside, the distance to the lattice is added to the value at its edge.

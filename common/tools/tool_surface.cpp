@@ -77,7 +77,7 @@ class Grid {
     for (int i = 0; i < 40 && (pb - pa).norm() > 1e-7 * cell_; ++i) {
       // Secant and bisection alternate: one is fast, the other reliable.
       const double t = i % 2 == 0 ? std::clamp(fa / (fa - fb), 0.02, 0.98) : 0.5;
-      const Vec3 p = pa + t * (pb - pa);
+      Vec3 p = pa + t * (pb - pa);  // not constant, so that it is moved out
       const double f = solid_(p) - kInside_mm;
       if (std::abs(f) < 1e-9) return p;
       if ((f < 0.0) == (fa < 0.0)) {

@@ -77,9 +77,10 @@ void check_names(const std::string& list, const std::vector<Entry>& entries) {
 void check_provenance(const std::string& field, const LabelProvenance& provenance) {
   check_text(field + ".method", provenance.method);
   check_count(field + ".parameters", provenance.parameters.size(), kMostParameters);
+  const std::string parameters = field + ".parameters";
   for (const auto& [name, value] : provenance.parameters) {
-    check_text(field + ".parameters", name);
-    if (!std::isfinite(value)) fault(field + ".parameters." + name, "is not a finite number");
+    check_text(parameters, name);
+    if (!std::isfinite(value)) fault((parameters + ".").append(name), "is not a finite number");
   }
   check_count(field + ".edits", provenance.edits.size(), kMostEdits);
   for (std::size_t i = 0; i < provenance.edits.size(); ++i) check_text(item(field + ".edits", i), provenance.edits[i]);

@@ -6,6 +6,7 @@
 #include <thread>
 
 #include "common/runtime/command_line.hpp"
+#include "common/runtime/number_option.hpp"
 #include "common/runtime/periodic.hpp"
 #include "common/runtime/realtime.hpp"
 
@@ -46,7 +47,7 @@ int run_check(int argc, char** argv) {
       "osteon-haptic check");
   double seconds = 1.0;
   app.add_option("--seconds", seconds, "How long to run an empty loop; 0: not at all")
-      ->check(CLI::Range(0.0, 3600.0))
+      ->check(number_in(0.0, 3600.0))
       ->capture_default_str();
   if (const auto code = parse_arguments(app, argc, argv)) return *code == 0 ? 0 : 2;
 

@@ -8,6 +8,7 @@
 #include <string>
 #include <utility>
 
+#include "common/runtime/number_option.hpp"
 #include "common/wire/credentials.hpp"
 
 namespace osteon {
@@ -24,7 +25,7 @@ CLI::App* add_asking_command(CLI::App& parent, const char* name, const char* wha
   sub->add_option("--server", given->server, "HOST:PORT of osteon-server")->required();
   wire::add_credential_options(*sub, given->credentials);
   sub->add_option("--timeout", given->patience_s, "Seconds to wait for the server")
-      ->check(CLI::Range(0.0, 3600.0))
+      ->check(number_in(0.0, 3600.0))
       ->capture_default_str();
   sub->callback([&chosen, given, run = std::move(run)] {
     chosen = [given, run]() -> Result<void> {

@@ -10,6 +10,7 @@
 
 #include "common/access/ticket.hpp"
 #include "common/runtime/files.hpp"
+#include "common/runtime/number_option.hpp"
 #include "common/runtime/secret_file.hpp"
 
 namespace osteon {
@@ -61,7 +62,7 @@ void add_ticket_command(CLI::App& app, std::function<Result<void>()>& chosen) {
   ticket->add_option("--room", given->room, "Name of the room, * for every room")->required();
   ticket->add_option("--user", given->user, "Whose: the name in the person's certificate")->required();
   ticket->add_option("--role", given->role, "observer, trainee, collaborator, instructor or operator")->required();
-  ticket->add_option("--hours", given->hours, "How long it is good")->required()->check(CLI::Range(0.001, 87600.0));
+  ticket->add_option("--hours", given->hours, "How long it is good")->required()->check(number_in(0.001, 87600.0));
   ticket->callback([&chosen, given] { chosen = [given] { return make_ticket(*given); }; });
 }
 

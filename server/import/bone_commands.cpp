@@ -13,6 +13,7 @@
 #include "common/geometry/mesh_file.hpp"
 #include "common/mechanics/force_law.hpp"
 #include "common/runtime/files.hpp"
+#include "common/runtime/number_option.hpp"
 #include "common/tools/tool_surface.hpp"
 #include "common/volume/cell_collision.hpp"
 #include "common/volume/field_file.hpp"
@@ -402,7 +403,7 @@ void add_bone_commands(CLI::App& app, std::vector<Command>& commands) {
   carve->add_option("--surface", a.surface, "Also write what is left of the bone: .stl, .ply or .obj");
   carve->add_option("--report", a.report, "Also write the steps' numbers as JSON");
   carve->add_option("--cut", a.cut_mm, "Longest path of one cut, mm")
-      ->check(CLI::Range(0.01, 25.0))
+      ->check(number_in(0.01, 25.0))
       ->capture_default_str();
   commands.push_back({carve, [shared](const StopSignal& stop) { return run_carve(*shared, stop); }});
 

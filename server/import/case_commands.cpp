@@ -11,6 +11,7 @@
 
 #include "common/geometry/mesh_file.hpp"
 #include "common/imaging/threshold.hpp"
+#include "common/runtime/number_option.hpp"
 #include "common/volume/case_scan.hpp"
 #include "common/volume/mesh_distance.hpp"
 #include "server/import/case_report.hpp"
@@ -23,7 +24,6 @@
 #include "server/import/label_export.hpp"
 #include "server/import/label_import.hpp"
 #include "server/import/label_map.hpp"
-#include "server/import/option_checks.hpp"
 #include "server/import/scan_arguments.hpp"
 #include "server/import/slice_images.hpp"
 
@@ -409,13 +409,13 @@ Result<std::string> run_labels(const CaseArguments& a, const StopSignal& stop) {
 }
 
 // The word "suggest", or a number within these limits.
-CLI::Validator suggest_or_within(double low, double high) {
-  const auto check = [number = within(low, high)](std::string value) {
+CLI::Validator suggest_or_number_in(double low, double high) {
+  const auto check = [number = number_in(low, high)](std::string value) {
     if (value == kSuggest) return std::string();
     const std::string wrong = number(value);
     return wrong.empty() ? wrong : wrong + ", nor the word " + kSuggest;
   };
-  return {check, "NUMBER or suggest", "suggest or within"};
+  return {check, "NUMBER or suggest", "suggest or number in"};
 }
 
 double millimetres_of(const std::string& unit) {
@@ -506,7 +506,7 @@ void add_smoothing_options(CLI::App& command, CaseArguments& a) {
   command
       .add_option("--gaussian", a.gaussian_mm,
                   "First smooth the scan with a Gaussian of this sigma, mm: takes out noise")
-      ->check(within(0.0, 10.0));
+      ->check(number_in(0.0, 10.0));
 }
 
 void add_density_options(CLI::App& command, CaseArguments& a) {
@@ -536,7 +536,7 @@ void add_density_options(CLI::App& command, CaseArguments& a) {
       ->check(CLI::IsMember({"on", "off"}))
       ->capture_default_str();
   command.add_option("--metal-hu", a.metal_hu, "Metal is at or above it, HU")
-      ->check(within(500.0, 32767.0))
+      ->check(number_in(500.0, 32767.0))
       ->capture_default_str();
 }
 
@@ -560,7 +560,7 @@ void add_slices_command(CLI::App& app, const std::shared_ptr<CaseArguments>& sha
                    "(white lines where they change most)")
       ->check(CLI::IsMember({"gradient", "canny"}));
   slices->add_option("--sigma", a.sigma_mm, "Of edges: smooth with a Gaussian of this sigma first, mm")
-      ->check(within(0.0, 10.0))
+      ->check(number_in(0.0, 10.0))
       ->capture_default_str();
   slices
       ->add_option("--limits", a.limits,
@@ -583,7 +583,7 @@ void add_case_commands(CLI::App& app, std::vector<Command>& commands) {
   add_scan_options(*ct, a.scan);
   ct->add_option("--out", a.out, "Folder of the case, made by this command");
   ct->add_option("--pitch", a.pitch_mm, "Voxel edge of the case, mm (default: the scan's smallest spacing)")
-      ->check(within(0.02, 10.0));
+      ->check(number_in(0.02, 10.0));
   CLI::Option* labels_option = ct->add_option(
       "--labels", a.labels,
       "Take bones and structures at risk from this label map instead: NIfTI, NRRD (.seg.nrrd), MetaImage or DICOM SEG, "
@@ -597,7 +597,7 @@ void add_case_commands(CLI::App& app, std::vector<Command>& commands) {
       ct->add_option("--threshold", a.threshold,
                      "Bone is at or above it, HU (default: 226, usual for adult skulls in slices of 1.5 mm), or "
                      "suggest: find it in the scan, and say why")
-          ->check(suggest_or_within(-1000.0, 4000.0))
+          ->check(suggest_or_number_in(-1000.0, 4000.0))
           ->excludes(labels_option);
   CLI::Option* keep = ct->add_option(
       "--keep", a.keep,
@@ -614,7 +614,7 @@ void add_case_commands(CLI::App& app, std::vector<Command>& commands) {
           ->excludes(labels_option);
   CLI::Option* similar = ct->add_option("--similar", a.similar_hu,
                                         "Grow over voxels within this number of HU of the seed, instead of a threshold")
-                             ->check(within(1.0, 4000.0))
+                             ->check(number_in(1.0, 4000.0))
                              ->needs(seed)
                              ->excludes(threshold);
   ct->add_flag("--adaptive", a.adaptive, "With --similar: of the mean of the region so far, instead of the seed")
@@ -664,7 +664,7 @@ void add_case_commands(CLI::App& app, std::vector<Command>& commands) {
       ->excludes(labels_option);
   add_smoothing_options(*ct, a);
   ct->add_option("--margin", a.margin_mm, "The case keeps the scan this far around its bones, mm")
-      ->check(within(0.0, 200.0))
+      ->check(number_in(0.0, 200.0))
       ->capture_default_str();
   add_density_options(*ct, a);
   ct->add_option("--title", a.title, "Name shown to people; do not use a patient's");
@@ -683,7 +683,7 @@ void add_case_commands(CLI::App& app, std::vector<Command>& commands) {
   labels->add_option("--out", a.out, "Folder of the case, made by this command")->required();
   labels->add_option("--spacing", a.spacing, "Size of a voxel, mm: X,Y,Z, or one number for all")->required();
   labels->add_option("--pitch", a.pitch_mm, "Voxel edge of the case, mm (default: the smallest spacing)")
-      ->check(within(0.02, 10.0));
+      ->check(number_in(0.02, 10.0));
   labels->add_option(
       "--bone", a.bone_colours,
       "R,G,B or R,G,B:DENSITY_G_CM3 of a colour that is bone; may be repeated (default: 255,249,219:1.9)");
@@ -695,9 +695,9 @@ void add_case_commands(CLI::App& app, std::vector<Command>& commands) {
   CLI::App* stl = app.add_subcommand("stl", "Make a case of one density from a closed triangle mesh");
   stl->add_option("FILE", a.input, "STL file, binary or text")->required();
   stl->add_option("--out", a.out, "Folder of the case, made by this command")->required();
-  stl->add_option("--pitch", a.pitch_mm, "Voxel edge of the case, mm (default: 0.5)")->check(within(0.02, 10.0));
+  stl->add_option("--pitch", a.pitch_mm, "Voxel edge of the case, mm (default: 0.5)")->check(number_in(0.02, 10.0));
   stl->add_option("--density", a.density_g_cm3, "Of all its bone, g/cm3")
-      ->check(within(0.05, 3.0))
+      ->check(number_in(0.05, 3.0))
       ->capture_default_str();
   stl->add_option("--unit", a.unit, "Of the file's numbers: mm, cm, m or inch")
       ->check(CLI::IsMember({"mm", "cm", "m", "inch"}))

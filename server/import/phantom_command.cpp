@@ -13,13 +13,13 @@
 #include "common/geometry/mesh_file.hpp"
 #include "common/imaging/calibration.hpp"
 #include "common/phantoms/phantom_case.hpp"
+#include "common/runtime/number_option.hpp"
 #include "common/volume/cut_field.hpp"
 #include "server/import/bone_recipe_file.hpp"
 #include "server/import/bone_surface.hpp"
 #include "server/import/case_report.hpp"
 #include "server/import/command.hpp"
 #include "server/import/dicom_writer.hpp"
-#include "server/import/option_checks.hpp"
 #include "server/import/phantom.hpp"
 #include "server/import/phantom_export.hpp"
 
@@ -193,7 +193,7 @@ void add_bone_options(CLI::App& phantom, CLI::Option* dicom, PhantomArguments& a
   text("--truth", a.truth, "Also write parameters, landmarks, axes, planes and labels of the bone, to this folder");
   const auto scanner = [&](const char* name, double& value, double least, double most, const char* help) {
     a.bone_options.push_back(
-        phantom.add_option(name, value, help)->check(within(least, most))->capture_default_str()->needs(dicom));
+        phantom.add_option(name, value, help)->check(number_in(least, most))->capture_default_str()->needs(dicom));
   };
   scanner("--pixel", a.scanner.pixel_mm, 0.1, 5.0, "Of --dicom of a bone: pixel of a slice, mm");
   scanner("--slice", a.slice_mm, 0.1, 10.0, "Of --dicom of a bone: thickness and distance of slices, mm");
@@ -220,9 +220,10 @@ void add_phantom_command(CLI::App& app, std::vector<Command>& commands) {
   phantom->add_option("--layers", a.layers,
                       "Of a block or tube: THICKNESS_MM:DENSITY_G_CM3,... such as 5:1.9,20:0.3,5:1.9");
   a.width = phantom->add_option("--width", a.width_mm, "Edge of the block, or length of the tube, mm")
-                ->check(within(1.0, 1000.0))
+                ->check(number_in(1.0, 1000.0))
                 ->capture_default_str();
-  phantom->add_option("--pitch", a.pitch_mm, "Voxel edge, mm (default: 0.4; of a bone 0.7)")->check(within(0.02, 10.0));
+  phantom->add_option("--pitch", a.pitch_mm, "Voxel edge, mm (default: 0.4; of a bone 0.7)")
+      ->check(number_in(0.02, 10.0));
   phantom->add_option("--out", a.out, "Folder of the case, made by this command")->required();
   CLI::Option* dicom = phantom->add_option(
       "--dicom", a.dicom, "Also write what a CT scanner would see of it, as a DICOM series, to this folder");

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "common/imaging/calibration.hpp"
+#include "common/runtime/number_option.hpp"
 #include "server/import/command.hpp"
 #include "server/import/scan_arguments.hpp"
 #include "server/import/subvolume_report.hpp"
@@ -103,11 +104,11 @@ void add_subvolume_command(CLI::App& app, std::vector<Command>& commands) {
       ->capture_default_str();
   command->add_option("--carve", a.script, "Script as of osteon-import carve: also cut, and report the active ones");
   command->add_option("--cut", a.cut_mm, "Longest way between two poses of a tool, mm")
-      ->check(CLI::Range(0.01, 25.0))
+      ->check(number_in(0.01, 25.0))
       ->capture_default_str();
   command
       ->add_option("--threshold", a.threshold_hu, "Of a scan or a Meta.dat: bone is at or above it, HU (default: 226)")
-      ->check(CLI::Range(-1000.0, 4000.0));
+      ->check(number_in(-1000.0, 4000.0));
   commands.push_back({command, [shared](const StopSignal& stop) { return run_subvolumes(*shared, stop); }});
 }
 

@@ -2,10 +2,12 @@
 #include <gtest/gtest.h>
 
 #include <QAction>
+#include <QCheckBox>
 #include <QDockWidget>
 #include <QLabel>
 #include <QMenu>
 #include <QSettings>
+#include <QSlider>
 #include <QStatusBar>
 #include <QTest>
 #include <QToolButton>
@@ -16,6 +18,7 @@
 
 #include "tests/integration/window_bench.hpp"
 #include "viewer_client/desktop/enabled.hpp"
+#include "viewer_client/desktop/sound_dialog.hpp"
 #include "viewer_client/desktop/start_page.hpp"
 
 namespace osteon {
@@ -141,6 +144,36 @@ TEST_F(DisabledParts, TheStartPageSaysWhyItWaits) {
   start->end_work({});
   EXPECT_EQ(window_->findChild<QWidget*>("import")->toolTip().toStdString(), own);
   EXPECT_TRUE(window_->findChild<QWidget*>("examples")->toolTip().isEmpty());
+}
+
+// Whoever switched it off: the dialog, the menu, or the user of the window before this one.
+TEST_F(DisabledParts, TheSoundDialogSaysWhyTheVolumeCannotBeSet) {
+  constexpr const char* kOff = "The sound is off.";
+  const auto open_dialog = [&] {
+    trigger("sound_settings");
+    return window_->findChild<SoundDialog*>("sound_dialog");
+  };
+  auto* dialog = open_dialog();
+  ASSERT_NE(dialog, nullptr);
+  ASSERT_TRUE(QTest::qWaitForWindowExposed(dialog));
+  auto* volume = dialog->findChild<QSlider*>("volume");
+  EXPECT_TRUE(volume->isEnabled());
+  EXPECT_TRUE(volume->toolTip().isEmpty());
+  EXPECT_EQ(label("sound_trouble"), "Only a practice room has sound. Open a bone first.") << "why nothing is measured";
+  QTest::keyClick(dialog->findChild<QCheckBox*>("sound_on"), Qt::Key_Space);
+  EXPECT_FALSE(volume->isEnabled());
+  EXPECT_EQ(tip_at(*volume, volume->rect().center()), kOff);
+  trigger("sound");
+  EXPECT_TRUE(volume->isEnabled());
+  EXPECT_TRUE(volume->toolTip().isEmpty());
+  trigger("sound");
+  EXPECT_FALSE(volume->isEnabled());
+  EXPECT_EQ(volume->toolTip().toStdString(), kOff);
+  begin();
+  volume = open_dialog()->findChild<QSlider*>("volume");
+  EXPECT_FALSE(volume->isEnabled());
+  EXPECT_EQ(volume->toolTip().toStdString(), kOff);
+  trigger("sound");  // for the next window
 }
 
 }  // namespace

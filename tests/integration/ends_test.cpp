@@ -13,8 +13,10 @@
 #include <vector>
 
 #include "tests/integration/window_bench.hpp"
+#include "viewer_client/desktop/bone_view.hpp"
 #include "viewer_client/desktop/room_link.hpp"
 #include "viewer_client/scene/camera_view.hpp"
+#include "viewer_client/scene/held_tools.hpp"
 
 namespace osteon {
 namespace {
@@ -28,6 +30,45 @@ double resident_mb() {
   double all = 0.0, resident = 0.0;
   pages >> all >> resident;
   return resident * static_cast<double>(::sysconf(_SC_PAGESIZE)) / 1e6;
+}
+
+// The room goes on to show the tool of an ended session for ten seconds, at rest.
+TEST_F(WindowEnds, TheViewGoesToNoToolOfAnEndedSession) {
+  constexpr AuthorId kGone{4}, kThere{5};
+  const auto tool_at = [](AuthorId author, const Vec3& at_mm) {
+    CuttingState state;
+    state.author = author;
+    state.tool_name = "drill-3.2";
+    state.pose_bone_tool.position_mm = at_mm;
+    return state;
+  };
+  const auto hand = [](AuthorId author, bool here) {
+    PersonSeen person;
+    person.author = author;
+    person.here = here;
+    person.hand = true;
+    return person;
+  };
+  const Vec3 gone_mm(60, 0, 0), there_mm(0, 60, 0);
+  std::vector<PersonSeen> people;
+  RenderQueue queue;
+  BoneView view;
+  BoneView::Events events;
+  events.people = [&people] { return people; };
+  view.set_events(events);
+  view.show_room(&queue, {Vec3(-80, -80, -80), Vec3(80, 80, 80)});
+  queue.put_states({tool_at(kGone, gone_mm), tool_at(kThere, there_mm)});
+  view.arrived();
+  const auto off_mm = [&](const Vec3& at_mm) {
+    view.look_overview();
+    view.look_tool();
+    return (view.camera().target_mm - at_mm).norm();
+  };
+  EXPECT_LT(off_mm(gone_mm), 1.0) << "until the room says who is there, each tool counts";
+  people = {hand(kGone, false), hand(kThere, true)};
+  EXPECT_LT(off_mm(there_mm), 1.0);
+  people[1].here = false;
+  EXPECT_LT(off_mm(Vec3::Zero()), 1.0) << "the camera stays at the middle of the bone";
 }
 
 // The threads of a connection write into the link's queue. A room may be left before the GUI thread has the connection.

@@ -67,6 +67,28 @@ class Help(unittest.TestCase):
                 self.assertIn(".SH OPTIONS", page)
                 self.assertIn(program, page)
 
+    # Limits let it pass by themselves, because it is neither below nor above them.
+    def test_every_number_with_limits_refuses_nan(self):
+        tried = 0
+        for program in PROGRAMS:
+            for command, text in all_helps(BIN / program):
+                words = " ".join(text.split())
+                for option in re.finditer(r" (--[a-z-]+) [A-Z]+:NUMBER (?:in \[|or )(.*?)(?= --|$)", words):
+                    times = re.match(r"[^\]]*\](?:=\S+)? x (\d)", option[2])
+                    values = ["nan"] * int(times[1] if times else 1)
+                    done = subprocess.run([*map(str, command), option[1], *values], capture_output=True, text=True,
+                                          check=False, timeout=60)
+                    self.assertNotEqual(done.returncode, 0, f"{command} {option[1]}")
+                    self.assertRegex(done.stderr, rf"^osteon[a-z -]*: {option[1]}: nan is not a number .*\n$", command)
+                    tried += 1
+        self.assertGreater(tried, 20)
+
+    # A check of CLI11 that lets nan pass shows in the help.
+    def test_no_limits_are_of_the_library(self):
+        for program in PROGRAMS:
+            for command, text in all_helps(BIN / program):
+                self.assertNotRegex(" ".join(text.split()), "FLOAT:(FLOAT in|POSITIVE|NONNEGATIVE)", command)
+
     def test_completes(self):
         self.assertIn("erase-person", completed("osteon-server", "er"))
         self.assertIn("create", completed("osteon-server", "rooms", ""))

@@ -10,6 +10,7 @@
 #include "common/runtime/command_line.hpp"
 #include "common/runtime/files.hpp"
 #include "common/runtime/log.hpp"
+#include "common/runtime/number_option.hpp"
 #include "common/runtime/stop_signal.hpp"
 #include "viewer_client/app/console.hpp"
 #include "viewer_client/app/viewer.hpp"
@@ -246,7 +247,7 @@ int main(int argc, char** argv) {
   app.add_option("--summary", arguments.summary, "JSON written at the end: blocks, triangles, hash, times");
   app.add_option("--timeout", arguments.patience_s, "Seconds to wait for the server")
       ->capture_default_str()
-      ->check(CLI::Range(0.0, 3600.0));
+      ->check(number_in(0.0, 3600.0));
   if (const auto code = parse_arguments(app, argc, argv)) return *code;
   log::open(kProgram);
   if (const auto outcome = run(arguments); !outcome) return log::exit_with(kProgram, outcome.error());

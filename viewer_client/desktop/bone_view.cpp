@@ -13,6 +13,7 @@
 #include <vtkRenderWindowInteractor.h>
 
 #include "viewer_client/desktop/structure_names.hpp"
+#include "viewer_client/scene/held_tools.hpp"
 
 namespace osteon {
 
@@ -143,8 +144,7 @@ void BoneView::look_from(const Vec3& side) {
 }
 
 void BoneView::look_tool() {
-  if (const CuttingState* held = updater_ ? updater_->held_tool() : nullptr)
-    look(beside_tool(held->pose_bone_tool, kToolDistance_mm));
+  if (const CuttingState* held = held_tool()) look(beside_tool(held->pose_bone_tool, kToolDistance_mm));
   following_ = follows_;
 }
 
@@ -201,8 +201,13 @@ void BoneView::pad_gone() {
   pointer_moved();
 }
 
+const CuttingState* BoneView::held_tool() const {
+  if (!updater_) return nullptr;
+  return first_held(updater_->states(), events_.people ? events_.people() : std::vector<PersonSeen>());
+}
+
 void BoneView::follow_tool() {
-  const CuttingState* held = following_ && updater_ ? updater_->held_tool() : nullptr;
+  const CuttingState* held = following_ ? held_tool() : nullptr;
   if (held == nullptr) return;
   const Pose& tool = held->pose_bone_tool;
   const CameraView now = camera();

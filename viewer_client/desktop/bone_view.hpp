@@ -10,6 +10,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <vector>
 
 #include <QVTKOpenGLNativeWidget.h>
 
@@ -17,6 +18,7 @@
 #include "viewer_client/pad/game_pad_mapping.hpp"
 #include "viewer_client/render/bone_scene.hpp"
 #include "viewer_client/render/scene_updater.hpp"
+#include "viewer_client/scene/supervision_client.hpp"
 #include "viewer_client/scene/tool_pointer.hpp"
 
 namespace osteon {
@@ -27,10 +29,11 @@ class BoneView : public QVTKOpenGLNativeWidget {
 
  public:
   struct Events {
-    std::function<void()> pointed;                   // pointer() changed
-    std::function<void()> pressed;                   // a push begins
-    std::function<void(const SurfaceHit&)> clicked;  // a click on the bone while placing() is on
-    std::function<void(const ViewFrustum&)> looked;  // the camera moved
+    std::function<void()> pointed;                    // pointer() changed
+    std::function<void()> pressed;                    // a push begins
+    std::function<void(const SurfaceHit&)> clicked;   // a click on the bone while placing() is on
+    std::function<void(const ViewFrustum&)> looked;   // the camera moved
+    std::function<std::vector<PersonSeen>()> people;  // those of the room, as far as they are known
   };
 
   explicit BoneView(QWidget* parent = nullptr);
@@ -55,8 +58,9 @@ class BoneView : public QVTKOpenGLNativeWidget {
   void look_overview();
   // From a direction: the eye lies that way from the middle of the bone.
   void look_from(const Vec3& side);
+  // At the first tool in a hand. That of an ended session is in no hand.
   void look_tool();
-  // The camera goes after the first tool, until look() or the mouse moves it. look_tool() sends it after the tool
+  // The camera goes after that tool, until look() or the mouse moves it. look_tool() sends it after the tool
   // again.
   void set_following(bool on);
   // The cap of a SpaceMouse was held so for dt_s. Its twist turns the tool in the hand, and its push moves the bone.
@@ -108,6 +112,8 @@ class BoneView : public QVTKOpenGLNativeWidget {
   void look_whole(const CameraView& from);
   void turn_camera(const QPoint& by, Qt::KeyboardModifiers keys);
   void camera_moved();
+  // Null: all hands are empty.
+  [[nodiscard]] const CuttingState* held_tool() const;
   void follow_tool();
   void pointer_moved();
   void lift_pen();

@@ -108,7 +108,8 @@ MainWindow::MainWindow() {
                      [this](const SurfaceHit& hit) { place_item(hit); },
                      [this](const ViewFrustum& from) {
                        if (room_) room_->look(from);
-                     }});
+                     },
+                     [this] { return room_ ? room_->people() : std::vector<PersonSeen>(); }});
   pages_->addWidget(start_);
   pages_->addWidget(view_);
   setCentralWidget(pages_);

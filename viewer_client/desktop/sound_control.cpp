@@ -50,8 +50,8 @@ void SoundControl::show_dialog() {
   if (dialog_ == nullptr)
     dialog_ = new SoundDialog(
         chosen_, [this](const SoundDialog::Chosen& chosen) { choose(chosen); }, window_);
-  refresh();
   dialog_->show();
+  refresh();
   dialog_->raise();
   dialog_->activateWindow();
 }

@@ -69,11 +69,6 @@ bool SceneUpdater::rebuild() {
   return true;
 }
 
-const CuttingState* SceneUpdater::held_tool() const {
-  const auto held = std::ranges::find_if(states_, [](const CuttingState& state) { return !state.tool_name.empty(); });
-  return held != states_.end() ? &*held : nullptr;
-}
-
 std::optional<std::size_t> SceneUpdater::percent_received() const {
   if (complete_ || snapshot_blocks_ == 0) return std::nullopt;
   return std::min<std::size_t>(99, 100 * snapshot_received_ / snapshot_blocks_);

@@ -32,8 +32,6 @@ class SceneUpdater {
   [[nodiscard]] std::string take_plan_fault() { return std::exchange(plan_fault_, {}); }
 
   [[nodiscard]] std::span<const CuttingState> states() const { return states_; }
-  // The first tool in a hand. Null: all hands are empty.
-  [[nodiscard]] const CuttingState* held_tool() const;
   [[nodiscard]] const std::vector<SceneItem>& items() const { return items_; }
   [[nodiscard]] const std::vector<BodyId>& bodies() const { return bodies_; }
   [[nodiscard]] const SurfaceScene& surface() const { return surface_; }

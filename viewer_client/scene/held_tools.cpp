@@ -38,6 +38,12 @@ std::vector<HeldTool> held_tools(std::span<const CuttingState> states, std::span
   return held;
 }
 
+const CuttingState* first_held(std::span<const CuttingState> states, std::span<const PersonSeen> people) {
+  const auto held = std::ranges::find_if(
+      states, [&](const CuttingState& state) { return !state.tool_name.empty() && !is_left_over(state, people); });
+  return held != states.end() ? &*held : nullptr;
+}
+
 const CuttingState* own_state(std::span<const CuttingState> states, std::span<const PersonSeen> people,
                               std::string_view own_name) {
   const auto found = std::ranges::find_if(states, [&](const CuttingState& state) {

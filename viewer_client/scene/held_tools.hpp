@@ -25,6 +25,9 @@ struct HeldTool {
 [[nodiscard]] std::vector<HeldTool> held_tools(std::span<const CuttingState> states, std::span<const PersonSeen> people,
                                                std::string_view own_name);
 
+// The first of held_tools(). Null: there is none.
+[[nodiscard]] const CuttingState* first_held(std::span<const CuttingState> states, std::span<const PersonSeen> people);
+
 // The state of this window's hand, whether it is empty or not. Null: it has none, or it is not in the room yet.
 [[nodiscard]] const CuttingState* own_state(std::span<const CuttingState> states, std::span<const PersonSeen> people,
                                             std::string_view own_name);

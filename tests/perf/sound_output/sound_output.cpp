@@ -8,6 +8,7 @@
 
 #include "common/runtime/command_line.hpp"
 #include "common/runtime/log.hpp"
+#include "common/runtime/number_option.hpp"
 #include "tests/perf/sound_output/output_trial.hpp"
 
 int main(int argc, char** argv) {
@@ -18,7 +19,7 @@ int main(int argc, char** argv) {
   app.require_subcommand(1);
   CLI::App* gapless = app.add_subcommand("gapless", "Gaps, and what the callback costs");
   CLI::App* latency = app.add_subcommand("latency", "From a cut on the server to the first changed sample");
-  gapless->add_option("minutes", trial.minutes)->check(CLI::Range(0.05, 60.0))->capture_default_str();
+  gapless->add_option("minutes", trial.minutes)->check(number_in(0.05, 60.0))->capture_default_str();
   latency->add_option("cuts", trial.cuts)->check(CLI::Range(1, 10'000))->capture_default_str();
   for (CLI::App* command : {gapless, latency}) {
     command->add_option("--listen", trial.listen, "loudspeakers, headphones or mono")->capture_default_str();

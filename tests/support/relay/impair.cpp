@@ -5,6 +5,7 @@
 
 #include "common/runtime/command_line.hpp"
 #include "common/runtime/files.hpp"
+#include "common/runtime/number_option.hpp"
 #include "tests/support/relay/relay.hpp"
 
 int main(int argc, char** argv) {
@@ -17,13 +18,15 @@ int main(int argc, char** argv) {
   app.add_option("--udp", options.udp, "A server's UDP port, ADDRESS:PORT");
   app.add_option("--tcp", options.tcp, "A server's TCP port, ADDRESS:PORT");
   app.add_option("--seed", options.seed, "Of all that is left to chance");
-  app.add_option("--loss", quality.loss, "Share of datagrams that are lost")->check(CLI::Range(0.0, 1.0));
-  app.add_option("--reorder", quality.reorder, "Share that later ones overtake")->check(CLI::Range(0.0, 1.0));
-  app.add_option("--duplicate", quality.duplicate, "Share that arrive twice")->check(CLI::Range(0.0, 1.0));
-  app.add_option("--corrupt", quality.corrupt, "Share of datagrams with bits flipped")->check(CLI::Range(0.0, 1.0));
-  app.add_option("--delay-ms", delay_ms, "One way")->check(CLI::Range(0.0, 1e5));
-  app.add_option("--jitter-ms", jitter_ms, "More or less of it")->check(CLI::Range(0.0, 1e5));
-  app.add_option("--kbit", kbit, "Kilobits a second of each direction; 0: no limit")->check(CLI::Range(0.0, 1e7));
+  app.add_option("--loss", quality.loss, "Share of datagrams that are lost")->check(osteon::number_in(0.0, 1.0));
+  app.add_option("--reorder", quality.reorder, "Share that later ones overtake")->check(osteon::number_in(0.0, 1.0));
+  app.add_option("--duplicate", quality.duplicate, "Share that arrive twice")->check(osteon::number_in(0.0, 1.0));
+  app.add_option("--corrupt", quality.corrupt, "Share of datagrams with bits flipped")
+      ->check(osteon::number_in(0.0, 1.0));
+  app.add_option("--delay-ms", delay_ms, "One way")->check(osteon::number_in(0.0, 1e5));
+  app.add_option("--jitter-ms", jitter_ms, "More or less of it")->check(osteon::number_in(0.0, 1e5));
+  app.add_option("--kbit", kbit, "Kilobits a second of each direction; 0: no limit")
+      ->check(osteon::number_in(0.0, 1e7));
   if (const auto code = osteon::parse_arguments(app, argc, argv)) return *code;
   quality.delay = std::chrono::nanoseconds(static_cast<std::int64_t>(delay_ms * 1e6));
   quality.jitter = std::chrono::nanoseconds(static_cast<std::int64_t>(jitter_ms * 1e6));

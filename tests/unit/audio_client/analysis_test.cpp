@@ -6,7 +6,9 @@
 #include <sys/stat.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
+#include <csignal>
 #include <fstream>
 #include <iostream>
 #include <nlohmann/json.hpp>
@@ -29,6 +31,7 @@
 #include "tests/support/process.hpp"
 #include "tests/support/shared_data.hpp"
 #include "tests/support/temp_dir.hpp"
+#include "tests/support/wait.hpp"
 #include "tests/unit/audio_client/scripted_drilling.hpp"
 #include "tests/unit/sound/signals.hpp"
 
@@ -293,6 +296,26 @@ TEST(SoundAnalysis, NamesOfLinesBeyondTheAxisAreNotWritten) {
   EXPECT_EQ(ink_at_the_right(fast), 0);
 }
 
+// At the first file, in the middle, and when all files are there.
+TEST(WriteAnalysis, AStopLeavesNothing) {
+  const SoundAnalysis analysis = analyse({.rate_hz = kAnalysisRate_hz, .samples = noise_with(0.1, {}, 1.0)}, {});
+  const test::TempDir temp;
+  std::vector<double> done;
+  const auto count = [&](double fraction) { return done.push_back(fraction), true; };
+  ASSERT_TRUE(write_analysis(analysis, {}, temp / "whole", count));
+  EXPECT_EQ(done.size(), test::names_in(temp / "whole").size()) << "asked once for each file";
+  EXPECT_TRUE(std::ranges::is_sorted(done));
+  EXPECT_NEAR(done.back(), 1.0, 1e-12);
+  for (const std::size_t stop_at : {std::size_t{1}, done.size() / 2, done.size()}) {
+    std::size_t asked = 0;
+    const auto written = write_analysis(analysis, {}, temp / "stopped", [&](double) { return ++asked < stop_at; });
+    ASSERT_FALSE(written) << stop_at;
+    EXPECT_EQ(written.error().code, ErrorCode::cancelled);
+    EXPECT_EQ(asked, stop_at) << "it goes on after the stop";
+    EXPECT_EQ(test::names_in(temp.path()), std::set<std::string>{"whole"}) << stop_at;
+  }
+}
+
 // A PNG file, row by row.
 struct Png {
   int width = 0, height = 0;
@@ -406,6 +429,26 @@ TEST_F(AnalyseProgram, WritesAFolderOfTablesAndPictures) {
   const test::RunResult again = analyse_with({wav().string(), "--out", (temp_ / "out").string()});
   EXPECT_EQ(again.exit_code, 1);
   EXPECT_THAT(again.err, testing::HasSubstr("already there"));
+}
+
+// Whether the signal comes before the last file or after it.
+TEST_F(AnalyseProgram, ASignalLeavesTheWholeFolderOrNone) {
+  for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
+    const fs::path out = temp_ / ("out-" + std::to_string(signal));
+    test::Process audio(test::program("osteon-audio"), {"analyse", wav().string(), "--out", out.string()});
+    const fs::path partial = out.string() + ".partial-" + std::to_string(audio.pid());
+    ASSERT_TRUE(test::wait_until([&] { return fs::exists(partial) || fs::exists(out); }, std::chrono::seconds(60)))
+        << audio.err();
+    audio.signal(signal);
+    const std::optional<int> code = audio.wait(std::chrono::seconds(60));
+    EXPECT_FALSE(fs::exists(partial)) << signal;
+    if (fs::exists(out)) {
+      EXPECT_EQ(test::names_in(out).size(), 14U) << signal;
+      continue;
+    }
+    EXPECT_EQ(code, 130) << signal;
+    EXPECT_EQ(audio.err(), "osteon-audio: stopped; " + out.string() + " was not written\n");
+  }
 }
 
 TEST_F(AnalyseProgram, ThePicturesShowTheirCurves) {
@@ -546,8 +589,8 @@ TEST_F(AnalyseProgram, WrongUseIsOneSentenceEach) {
       {{drilling, "--out", drilling}, {"drilling.wav", "already there"}},
       {{drilling, "--channel", "middle"}, {"--channel", "middle"}},
       {{drilling, "--rpm", "0"}, {"--rpm"}},
-      {{drilling, "--rpm", "nan"}, {"--rpm", "nan is no finite number"}},
-      {{drilling, "--full-scale-pa", "nan"}, {"--full-scale-pa", "nan is no finite number"}},
+      {{drilling, "--rpm", "nan"}, {"--rpm", "nan is not a number from 10 to 100000"}},
+      {{drilling, "--full-scale-pa", "nan"}, {"--full-scale-pa", "nan is not a number from 1e-06 to 1000000"}},
       {{drilling, "--free", "nan", "2"}, {"--free", "drilling.wav"}},
       {{drilling, "--free", "0.1", "nan"}, {"--free", "drilling.wav"}},
       {{drilling, "--free", "3", "2"}, {"--free", "drilling.wav"}},

@@ -73,5 +73,27 @@ TEST(BoundedText, IsOneLineOfSoManyBytes) {
   EXPECT_EQ(bounded_text("abä", 3), "ab ...") << "a character must not be split";
 }
 
+// Unicode 15, table 3-7: well-formed UTF-8 byte sequences.
+TEST(BoundedText, IsUtf8) {
+  // The first and the last character of each length, and those around the UTF-16 pairs.
+  for (const std::string good : {"\xc2\xa0", "\xdf\xbf", "\xe0\xa0\x80", "\xed\x9f\xbf", "\xee\x80\x80", "\xef\xbf\xbf",
+                                 "\xf0\x90\x80\x80", "\xf4\x8f\xbf\xbf"}) {
+    EXPECT_EQ(bounded_text("a" + good + "b"), "a" + good + "b");
+    for (std::size_t part = 1; part < good.size(); ++part) {
+      EXPECT_EQ(bounded_text("a" + good, part + 1), "a ...") << "split behind byte " << part;
+      EXPECT_EQ(bounded_text(good.substr(0, part)), std::string(part, '?')) << "cut behind byte " << part;
+      EXPECT_EQ(bounded_text(good.substr(0, part) + "b"), std::string(part, '?') + "b");
+    }
+    EXPECT_EQ(bounded_text(good, good.size()), good);
+  }
+  // Single bytes, forms longer than needed, half of a UTF-16 pair, beyond U+10FFFF, and of five bytes.
+  for (const std::string wrong :
+       {"\x80", "\xbf", "\xc0\x80", "\xc1\xbf", "\xe0\x9f\xbf", "\xed\xa0\x80", "\xed\xbf\xbf", "\xf0\x8f\xbf\xbf",
+        "\xf4\x90\x80\x80", "\xf5\x80\x80\x80", "\xf8\x88\x80\x80\x80", "\xff"})
+    EXPECT_EQ(bounded_text("a" + wrong + "ä"), "a" + std::string(wrong.size(), '?') + "ä");
+  EXPECT_EQ(bounded_text("\xe4"), "?") << "ä of Latin 1 at the end";
+  EXPECT_EQ(bounded_text(std::string(9, '\x80'), 4), "???? ...");
+}
+
 }  // namespace
 }  // namespace osteon

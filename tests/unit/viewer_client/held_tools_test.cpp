@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <span>
+#include <vector>
+
 namespace osteon {
 namespace {
 
@@ -48,8 +51,11 @@ TEST(HeldTools, TheToolOfAnEndedSessionIsInNobodysHand) {
   ASSERT_EQ(held.size(), 1u);
   EXPECT_TRUE(held[0].own());
   EXPECT_EQ(own_state(states, people, "Berg"), nullptr);
+  EXPECT_EQ(first_held(states, people), &states[1]);
+  EXPECT_EQ(first_held(std::span(states).first(1), people), nullptr);
   // Until the room says who is there, each tool counts.
   EXPECT_EQ(held_tools(states, {}, "Ada").size(), 2u);
+  EXPECT_EQ(first_held(states, {}), &states[0]);
 }
 
 TEST(HeldTools, AToolThatMovesWithoutItsPersonIsOfARoomThatIsPlayed) {
@@ -67,6 +73,7 @@ TEST(HeldTools, AnEmptyHandHoldsNoToolButIsOurOwn) {
   EXPECT_TRUE(held_tools(std::vector{empty}, people, "Ada").empty());
   const std::vector states{empty};
   EXPECT_EQ(own_state(states, people, "Ada"), &states.front());
+  EXPECT_EQ(first_held(states, people), nullptr);
 }
 
 }  // namespace
