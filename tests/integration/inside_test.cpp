@@ -1,6 +1,8 @@
 // An observer who comes late holds the bone of a room in which two people drill. Server and hands are processes.
 #include <gtest/gtest.h>
 
+#include <csignal>
+
 #include "tests/integration/stage.hpp"
 #include "tests/support/wait.hpp"
 #include "tests/unit/rooms/members.hpp"
@@ -100,7 +102,8 @@ TEST(Inside, AnObserverHoldsTheBoneAgainAfterTheServerWasKilled) {
   ASSERT_TRUE(wait_until([&] { return agree(observer); }, 60s));
   Digest before;
   ASSERT_TRUE(held->read([&](const Replica& bone) { before = bone.hash(); }));
-  stage.server().kill();
+  stage.server().signal(SIGKILL);
+  (void)stage.server().wait(20s);
   ASSERT_TRUE(held->wait([](const HeldBoneStatus& now) { return now.state == HeldBoneState::interrupted; }, 60s));
   EXPECT_TRUE(held->read([&](const Replica& bone) { EXPECT_EQ(bone.hash(), before); })) << "pictures go on";
   stage.start_server({"--plain", "--journal", journal, "--listen", address});

@@ -11,6 +11,8 @@ namespace osteon {
 namespace {
 
 constexpr int kCutsBetweenWeighings = 64;
+// [A] No leaf with bone begins farther from the bone's box: the largest, 8 samples of the pitch, is a few mm long.
+constexpr double kFarthest_mm = 100.0;
 
 Error at_fault(const std::string& what) {
   return {ErrorCode::invalid_input, "the server sent an invalid message: " + what};
@@ -42,7 +44,10 @@ Result<void> all_of_bodies(const std::vector<FieldLeaf>& leaves, const std::vect
 }  // namespace
 
 FieldFollower::FieldFollower(const Case& bone, std::size_t most_bytes)
-    : most_bytes_(most_bytes), bone_(bone, BodyId{}, tools_) {}
+    : pitch_mm_(bone.pitch_mm()),
+      near_(bone.bounds().grown(kFarthest_mm)),
+      most_bytes_(most_bytes),
+      bone_(bone, BodyId{}, tools_) {}
 
 void FieldFollower::begin() {
   follows_ = false;
@@ -67,11 +72,8 @@ Result<void> FieldFollower::take_beginning(const v1::WatchFieldResponse& message
   switch (message.message_case()) {
     case v1::WatchFieldResponse::kTool:
       return take(message.tool());
-    case v1::WatchFieldResponse::kLeaf: {
-      Result<FieldLeaf> leaf = checked(wire::from_wire(message.leaf()));
-      if (!leaf) return tl::unexpected(leaf.error());
-      return keep_waiting(std::move(*leaf));
-    }
+    case v1::WatchFieldResponse::kLeaf:
+      return keep_waiting(message.leaf());
     case v1::WatchFieldResponse::kComplete:
       return take(message.complete());
     default:
@@ -131,11 +133,8 @@ Result<void> FieldFollower::take(const v1::BoneChange& change) {
   if (changing_ ? seq != *changing_ : seq <= bone_.room_seq())
     return tl::unexpected(at_fault("change.room_seq is not that of the next event"));
   changing_ = seq;
-  for (const v1::FieldLeaf& sent : change.leaves()) {
-    Result<FieldLeaf> leaf = checked(wire::from_wire(sent));
-    if (!leaf) return tl::unexpected(leaf.error());
-    if (Result<void> kept = keep_waiting(std::move(*leaf)); !kept) return kept;
-  }
+  for (const v1::FieldLeaf& sent : change.leaves())
+    if (Result<void> kept = keep_waiting(sent); !kept) return kept;
   if (!change.last()) return {};
   const Result<std::vector<BodyId>> bodies = bodies_of(change.bodies());
   if (!bodies) return tl::unexpected(bodies.error());
@@ -158,9 +157,14 @@ Result<void> FieldFollower::take(const v1::ToolAdded& added) {
   return check_bytes();
 }
 
-Result<void> FieldFollower::keep_waiting(FieldLeaf leaf) {
-  waiting_bytes_ += sizeof(FieldLeaf) + leaf.values.size() * sizeof(leaf.values[0]);
-  waiting_.push_back(std::move(leaf));
+Result<void> FieldFollower::keep_waiting(const v1::FieldLeaf& sent) {
+  Result<FieldLeaf> leaf = checked(wire::from_wire(sent));
+  if (!leaf) return tl::unexpected(leaf.error());
+  const Vec3 at_mm = position_mm(leaf->origin, level_pitch_mm(pitch_mm_, leaf->level));
+  if ((at_mm.array() < near_.min_mm.array()).any() || (at_mm.array() > near_.max_mm.array()).any())
+    return tl::unexpected(at_fault("leaf.origin is far from the bone"));
+  waiting_bytes_ += sizeof(FieldLeaf) + leaf->values.size() * sizeof(leaf->values[0]);
+  waiting_.push_back(std::move(*leaf));
   return check_bytes();
 }
 

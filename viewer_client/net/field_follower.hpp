@@ -15,6 +15,7 @@ namespace osteon::v1 {
 class BoneChange;
 class CommittedCut;
 class FieldComplete;
+class FieldLeaf;
 class ToolAdded;
 class WatchFieldResponse;
 }  // namespace osteon::v1
@@ -56,11 +57,13 @@ class FieldFollower {
   [[nodiscard]] Result<void> take(const v1::CommittedCut& committed);
   [[nodiscard]] Result<void> take(const v1::BoneChange& change);
   [[nodiscard]] Result<void> take(const v1::ToolAdded& added);
-  [[nodiscard]] Result<void> keep_waiting(FieldLeaf leaf);
+  [[nodiscard]] Result<void> keep_waiting(const v1::FieldLeaf& sent);
   [[nodiscard]] Result<void> weigh();  // the fields
   [[nodiscard]] Result<void> check_bytes() const;
   void note_changes();
 
+  const double pitch_mm_;
+  const Box near_;  // where leaves may begin
   const std::size_t most_bytes_;
   const std::shared_ptr<ToolBox> tools_ = builtin_tool_box();  // shared with the replica's fields
   Replica bone_;

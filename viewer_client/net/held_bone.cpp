@@ -122,7 +122,9 @@ void HeldBone::Impl::fail(const Error& why) {
   if (ending) return;
   log::warn("the inside of the bone is not shown", {{"reason", why.message}});
   follower.reset();
-  status = {.state = HeldBoneState::failed, .asked_again = status.asked_again, .why = why};
+  status.state = HeldBoneState::failed;
+  status.bodies = status.bytes = 0;
+  status.why = why;
   changed.notify_all();
 }
 

@@ -258,6 +258,9 @@ TEST_F(Following, RefusesWhatNoServerSends) {
   follower_.begin();
   ASSERT_TRUE(follower_.take(leaf));
   EXPECT_THAT(follower_.take(nobody).error().message, HasSubstr("not among bodies"));
+  leaf.mutable_leaf()->mutable_origin()->set_x(1 << 30);
+  follower_.begin();
+  EXPECT_THAT(follower_.take(leaf).error().message, HasSubstr("far from the bone"));
   EXPECT_EQ(follower_.bone().hash(), before) << "what was refused changed nothing";
 
   // A change in two parts, the second of which is missing.
