@@ -31,7 +31,7 @@ class FieldSource {
 };
 
 struct HeldBoneOptions {
-  // Of the bone's cut fields, [A]: a drilled skull needs a tenth. A viewer has as much again for its case.
+  // [A] Of cut fields and what waits to get into them. The case itself comes on top.
   std::size_t most_bytes = std::size_t{2} << 30;
   std::chrono::milliseconds pause{200}, longest_pause{2000};  // before it asks again, random between
 };
