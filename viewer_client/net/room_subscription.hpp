@@ -29,7 +29,7 @@ struct RoomSubscriptionOptions {
   std::string name = "viewer";  // shown to others
   std::chrono::milliseconds patience{5000};
   // The window's first view of a bone with these bounds. None: the whole bone in full detail.
-  std::function<ViewFrustum(const Box&)> first_look;
+  std::function<ViewFrustum(const Box&)> first_look{};
   bool keep_trying = false;  // after a lost connection: retry without end, not only for `patience`
   std::filesystem::path cache = default_case_cache();  // of the cases of hold_bone()
 };
