@@ -22,7 +22,7 @@ json plan_beside(double x_mm) {
 }
 
 // Whether the observer holds what the server has, at the same event.
-bool agree(const RoomSubscription& observer) {
+bool holds_the_servers_bone(const RoomSubscription& observer) {
   const v1::GetStatusResponse server = status_of(observer.joined());
   bool same = false;
   const bool there = observer.held_bone()->read([&](const Replica& bone) {
@@ -57,7 +57,7 @@ TEST(Inside, AnObserverWhoComesLateHoldsTheBoneThatTwoPeopleDrill) {
       << anna.err() << ben.err();
   EXPECT_GT(held->status().bytes, 0u);
   for (Process* hand : {&anna, &ben}) ASSERT_TRUE(hand->terminate(20s).has_value());
-  ASSERT_TRUE(wait_until([&] { return agree(observer); }, 60s));
+  ASSERT_TRUE(wait_until([&] { return holds_the_servers_bone(observer); }, 60s));
   Digest drilled;
   double removed_mm3 = 0.0;
   ASSERT_TRUE(held->read([&](const Replica& bone) { drilled = bone.hash(), removed_mm3 = bone.removed_mm3(); }));
@@ -68,7 +68,7 @@ TEST(Inside, AnObserverWhoComesLateHoldsTheBoneThatTwoPeopleDrill) {
 
   // Undo brings bone back, for the observer too.
   ASSERT_TRUE(observer.undo(60));
-  ASSERT_TRUE(wait_until([&] { return agree(observer); }, 60s));
+  ASSERT_TRUE(wait_until([&] { return holds_the_servers_bone(observer); }, 60s));
   Digest undone;
   double less_mm3 = 0.0;
   ASSERT_TRUE(held->read([&](const Replica& bone) { undone = bone.hash(), less_mm3 = bone.removed_mm3(); }));
@@ -99,7 +99,7 @@ TEST(Inside, AnObserverHoldsTheBoneAgainAfterTheServerWasKilled) {
   ASSERT_TRUE(held->wait([](const HeldBoneStatus& now) { return now.room_seq.value > 50; }, 60s));
   const std::string address = stage.address();
   ASSERT_TRUE(anna.terminate(20s).has_value());
-  ASSERT_TRUE(wait_until([&] { return agree(observer); }, 60s));
+  ASSERT_TRUE(wait_until([&] { return holds_the_servers_bone(observer); }, 60s));
   Digest before;
   ASSERT_TRUE(held->read([&](const Replica& bone) { before = bone.hash(); }));
   stage.server().signal(SIGKILL);
@@ -108,7 +108,7 @@ TEST(Inside, AnObserverHoldsTheBoneAgainAfterTheServerWasKilled) {
   EXPECT_TRUE(held->read([&](const Replica& bone) { EXPECT_EQ(bone.hash(), before); })) << "pictures go on";
   stage.start_server({"--plain", "--journal", journal, "--listen", address});
   ASSERT_TRUE(held->wait([](const HeldBoneStatus& now) { return now.state == HeldBoneState::follows; }, 60s));
-  ASSERT_TRUE(wait_until([&] { return agree(observer); }, 60s));
+  ASSERT_TRUE(wait_until([&] { return holds_the_servers_bone(observer); }, 60s));
   EXPECT_TRUE(held->read([&](const Replica& bone) { EXPECT_EQ(bone.hash(), before); }));
   EXPECT_GE(held->status().asked_again, 1u);
 }

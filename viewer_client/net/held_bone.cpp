@@ -142,10 +142,12 @@ HeldBone::~HeldBone() {
 }
 
 void HeldBone::end() {
+  {
+    const MutexLock lock(impl_->mutex);
+    impl_->ending = true;
+    impl_->changed.notify_all();
+  }
   impl_->source->cancel();
-  const MutexLock lock(impl_->mutex);
-  impl_->ending = true;
-  impl_->changed.notify_all();
 }
 
 HeldBoneStatus HeldBone::status() const {
