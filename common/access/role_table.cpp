@@ -31,6 +31,7 @@ constexpr std::array kCalls{
     CallRow{"/osteon.v1.WatchService/WatchMesh", kInRoom},
     CallRow{"/osteon.v1.WatchService/LookFrom", kInRoom},
     CallRow{"/osteon.v1.WatchService/WatchCutting", kInRoom},
+    CallRow{"/osteon.v1.FieldService/WatchField", kInRoom},
     CallRow{"/osteon.v1.PlanService/GetPlan", kInRoom},
     CallRow{"/osteon.v1.PlanService/GetDensity", kInRoom},
     // Annotations and messages reach everybody. The stream leaves out what a role may not receive.
@@ -56,7 +57,7 @@ constexpr std::array kCalls{
 // In the order of the enumerations.
 constexpr std::array<RoleSet, kDatagrams> kCarried{kCutters, kCutters, kCutters, kCutters,
                                                    kCutters, kCutters, kCutters, kCutters};
-constexpr std::array<RoleSet, kStreamContents> kContents{kInRoom, kInRoom,     kInRoom, kCutters,   kInRoom,
+constexpr std::array<RoleSet, kStreamContents> kContents{kInRoom, kInRoom,     kInRoom, kInRoom,    kInRoom,
                                                          kInRoom, kInstructor, kInRoom, kInstructor};
 constexpr std::array<RoleSet, kRights> kGranted{kCutters, kCutters, kPartners, kInstructor};
 

@@ -1,13 +1,11 @@
 #include "haptic_client/net/room_session.hpp"
 
 #include <grpcpp/grpcpp.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <atomic>
 #include <cstdlib>
 #include <deque>
-#include <fstream>
 #include <optional>
 #include <span>
 #include <thread>
@@ -16,7 +14,9 @@
 #include "common/core/check.hpp"
 #include "common/core/mutex.hpp"
 #include "common/link/backoff.hpp"
+#include "common/volume/case_cache.hpp"
 #include "common/wire/bone_motion.hpp"
+#include "common/wire/case_files.hpp"
 #include "common/wire/convert.hpp"
 #include "haptic_client/net/cuts_underway.hpp"
 #include "haptic_client/net/fast_path.hpp"
@@ -34,95 +34,17 @@ constexpr auto kCloseTime = 1s;
 constexpr std::chrono::milliseconds kLongestRedial = 10s;  // of a waiting time that a server requests
 constexpr auto kPushesApart = 33ms;                        // over the stream
 constexpr auto kAcknowledgeEvery = 250ms;  // between two acknowledgements of what this client has received
-constexpr auto kCaseSilence = 60s;         // a whole case takes no longer on one machine
-
-Error cannot_cache(const fs::path& path, const std::string& why) {
-  return {ErrorCode::internal,
-          "cannot store the case in the cache: " + path.string() + ": " + why + "; give another folder with --cache"};
-}
 
 std::span<const std::uint8_t> bytes_of(const std::string& text) {
   return {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()};
 }
 
-// Writes the case's files as they are received. A correct server sends these names and no others.
-Result<void> receive_case(const wire::JoinedRoom& room, const fs::path& folder, const std::function<bool()>& stop) {
-  v1::GetCaseRequest request;
-  request.set_case_hash(wire::to_wire(room.case_hash));
-  grpc::ClientContext context;
-  context.set_deadline(std::chrono::system_clock::now() + kCaseSilence);
-  const auto reader = v1::RoomService::NewStub(room.channel)->GetCase(&context, request);
-
-  std::optional<Error> failed;
-  std::string open_name;
-  std::ofstream file;
-  v1::GetCaseResponse piece;
-  while (!failed && reader->Read(&piece)) {
-    if (stop && stop()) {
-      failed = Error{ErrorCode::cancelled, "stopped while the case was fetched"};
-    } else if (piece.file() != "case.json" && piece.file() != "bone.vdb") {
-      failed = Error{ErrorCode::unsupported, "the server sent a file that no case has: " + piece.file()};
-    } else {
-      if (piece.file() != open_name) {
-        file.close();
-        file.clear();
-        file.open(folder / piece.file(), std::ios::binary | std::ios::trunc);
-        open_name = piece.file();
-      }
-      file.write(piece.data().data(), static_cast<std::streamsize>(piece.data().size()));
-      file.flush();
-      if (!file) failed = cannot_cache(folder / open_name, "it cannot be written (is the disk full?)");
-    }
-  }
-  if (failed) context.TryCancel();
-  const grpc::Status status = reader->Finish();
-  if (failed) return tl::unexpected(*failed);
-  if (!status.ok())
-    return failure(ErrorCode::unavailable, "the server stopped sending the case: " + status.error_message());
-  return {};
-}
-
-// The folder into which a case is fetched. It is removed unless it was moved to its final path.
-class PartialFolder {
- public:
-  explicit PartialFolder(fs::path path) : path_(std::move(path)) {}
-  ~PartialFolder() {
-    std::error_code ignored;
-    fs::remove_all(path_, ignored);
-  }
-  PartialFolder(const PartialFolder&) = delete;
-  PartialFolder& operator=(const PartialFolder&) = delete;
-  [[nodiscard]] const fs::path& path() const { return path_; }
-
- private:
-  fs::path path_;
-};
-
 Result<Case> fetch_case(const wire::JoinedRoom& room, const fs::path& cache, const std::function<bool()>& stop) {
-  const fs::path place = cache / to_hex(room.case_hash);
-  if (Result<Case> kept = Case::load(place); kept && kept->hash() == room.case_hash) return kept;
-
-  const PartialFolder part(cache / (to_hex(room.case_hash) + ".part-" + std::to_string(::getpid())));
-  std::error_code error;
-  fs::remove_all(part.path(), error);
-  fs::create_directories(part.path(), error);
-  if (error) return tl::unexpected(cannot_cache(part.path(), error.message()));
-  if (const Result<void> received = receive_case(room, part.path(), stop); !received)
-    return tl::unexpected(received.error());
-  Result<Case> fetched = Case::load(part.path());
-  if (!fetched) return fetched;
-  if (fetched->hash() != room.case_hash)
-    return failure(ErrorCode::invalid_input, "the server sent the case " + to_hex(fetched->hash()) + " where " +
-                                                 to_hex(room.case_hash) + " was announced");
-
-  // A damaged folder is replaced. A folder that another client has put there in the meantime is as good as ours.
-  fs::rename(part.path(), place, error);
-  if (error) {
-    if (const Result<Case> other = Case::load(place); other && other->hash() == room.case_hash) return fetched;
-    fs::remove_all(place, error);
-    fs::rename(part.path(), place, error);
-    if (error) return tl::unexpected(cannot_cache(place, error.message()));
-  }
+  Result<Case> fetched = cached_case(cache, room.case_hash, [&](const fs::path& folder) {
+    return wire::fetch_case_files(room, folder, {.stop = stop});
+  });
+  if (!fetched && fetched.error().code == ErrorCode::internal)
+    fetched.error().message += "; give another folder with --cache";
   return fetched;
 }
 
@@ -158,12 +80,6 @@ Result<void> fetch_tools(const wire::JoinedRoom& room, ToolBox& tools) {
 }
 
 }  // namespace
-
-fs::path default_case_cache() {
-  if (const char* cache = std::getenv("XDG_CACHE_HOME"); cache && *cache) return fs::path(cache) / "osteon" / "cases";
-  if (const char* home = std::getenv("HOME"); home && *home) return fs::path(home) / ".cache" / "osteon" / "cases";
-  return fs::temp_directory_path() / "osteon" / "cases";
-}
 
 struct RoomSession::Impl {
   Impl(wire::JoinedRoom r, Case b, RoomSessionOptions o)

@@ -13,14 +13,12 @@
 #include "common/field/field_hash.hpp"
 #include "common/tools/tool_box.hpp"
 #include "common/volume/case.hpp"
+#include "common/volume/case_cache.hpp"
 #include "common/wire/room_client.hpp"
 #include "haptic_client/net/room_messages.hpp"
 #include "haptic_client/net/room_port.hpp"
 
 namespace osteon {
-
-// XDG_CACHE_HOME/osteon/cases, or ~/.cache/osteon/cases.
-[[nodiscard]] std::filesystem::path default_case_cache();
 
 struct RoomSessionOptions {
   std::string address;  // HOST:PORT

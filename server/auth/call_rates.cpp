@@ -32,7 +32,7 @@ constexpr std::array kRates{
     Row{"/osteon.v1.RoomService/SaveFields", kSaying},     Row{"/osteon.v1.RoomService/GetStatus", kLookingUp},
     Row{"/osteon.v1.RoomService/GetCase", kComing},        Row{"/osteon.v1.RoomsService/BranchRoom", kSaying},
     Row{"/osteon.v1.RoomsService/ReplayRoom", kSaying},    Row{"/osteon.v1.PlanService/GetPlan", kComing},
-    Row{"/osteon.v1.PlanService/GetDensity", kComing},
+    Row{"/osteon.v1.PlanService/GetDensity", kComing},     Row{"/osteon.v1.FieldService/WatchField", kComing},
 };
 
 }  // namespace

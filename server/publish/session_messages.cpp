@@ -171,6 +171,11 @@ SessionMessage noted_message(RoomSeq seq, const std::string& mark) {
   return message_of(response, seq);
 }
 
+Bytes field_entry(const SessionMessage& message, bool may_receive_field) {
+  const bool whole = !message.content || (*message.content == StreamContent::field && may_receive_field);
+  return whole ? message.bytes : noted_message(message.seq, {}).bytes;
+}
+
 std::vector<SessionMessage> change_messages(const RoomEvent& event) {
   std::vector<SessionMessage> messages;
   std::size_t next = 0;

@@ -30,6 +30,10 @@ struct SessionMessage {
   wire::SessionEntry fast{};               // the short form for the fast path; `streamed`: there is none
 };
 
+// What a reader of the field is sent for it, a whole WatchFieldResponse: the same bytes if they are about the field and
+// `may_receive_field`, else that there was an event.
+[[nodiscard]] Bytes field_entry(const SessionMessage& message, bool may_receive_field);
+
 // What a session begins with.
 struct SessionStart {
   RoomSeq contained;                     // the sequence number that the leaves contain

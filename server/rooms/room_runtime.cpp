@@ -172,6 +172,7 @@ RuntimeHealth RoomRuntime::health() const {
     const MutexLock lock(impl_->sessions_mutex);
     health.sessions = impl_->sessions.size();
     impl_->sessions.each(look);
+    impl_->field_readers.each(look);
   }
   const MeshHealth mesh = impl_->mesh.health();
   health.mesh_update = mesh.update;

@@ -57,6 +57,16 @@ class SessionSubscriber : public Subscriber {
   virtual void decided() = 0;  // one queued cut has left the queue
 };
 
+// Whoever shows the inside of the bone. It only receives: the leaves, then every event.
+class FieldSubscriber : public Subscriber {
+ public:
+  [[nodiscard]] virtual AuthorId author() const = 0;
+  // As for sessions.
+  virtual void begin(SessionStart start) = 0;
+  virtual void set_leaves(std::vector<FieldLeaf> leaves) = 0;
+  virtual void enqueue(const SessionMessage& message) = 0;
+};
+
 struct RuntimeRates {
   // Zero: driven. The runtime has no thread and no surface. Its owner calls tick(), and slow requests are answered at
   // once.
@@ -157,6 +167,11 @@ class RoomRuntime {
   // earlier session of that author. Error: invalid_input (the author may not cut, or has an open session).
   [[nodiscard]] Result<void> open_session(const std::shared_ptr<SessionSubscriber>& subscriber,
                                           const Digest& secret = {});
+  // Of a room. Each is sent a copy of all leaves at first.
+  static constexpr std::size_t kMostFieldReaders = 32;
+  // The reader gets every event after those in its leaves. It replaces an earlier reader of its author. Errors:
+  // unavailable (a playback), exhausted (kMostFieldReaders read already).
+  [[nodiscard]] Result<void> watch_field(const std::shared_ptr<FieldSubscriber>& reader);
   // `look`: the author's first view. Without one, the subscriber is sent the whole bone in full.
   void watch_mesh(MeshSubscriber& subscriber, const std::optional<ViewFrustum>& look = std::nullopt);
   // The newest view of each viewer counts until its last mesh stream ends. Ignored for a viewer without a mesh stream.
@@ -167,6 +182,7 @@ class RoomRuntime {
   [[nodiscard]] Presence& people();
   // The subscriber gets nothing more after this. Unknown subscribers are ignored.
   void leave(SessionSubscriber& subscriber);
+  void leave(FieldSubscriber& reader);
   void leave(MeshSubscriber& subscriber);
   void leave(StateSubscriber& subscriber);
 

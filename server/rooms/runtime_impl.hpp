@@ -68,6 +68,13 @@ struct RoomRuntime::Impl {
     [[nodiscard]] bool is_for(AuthorId author) const { return message && (!to || to == author); }
   };
   [[nodiscard]] Personal personal_message(const RoomEvent& event);
+  // What everybody who holds the bone begins with.
+  [[nodiscard]] SessionStart start_of_field() OSTEON_REQUIRES_SHARED(room_mutex);
+  // The leaves of all bodies, without their values.
+  [[nodiscard]] std::vector<FieldLeaf> places_of_leaves() const OSTEON_REQUIRES_SHARED(room_mutex);
+  // Reads the leaves, and gives them to a receiver that has begun once all it began with is durable.
+  template <class Receiver>
+  void give_leaves(RoomRuntime& runtime, const std::shared_ptr<Receiver>& receiver, std::vector<FieldLeaf> leaves);
   // `held`: the author's restrictions, which `by` decided.
   [[nodiscard]] SessionStart start_of_session(AuthorId author, const People::Supervised& held, const Decider& by)
       OSTEON_REQUIRES_SHARED(room_mutex);
@@ -130,6 +137,7 @@ struct RoomRuntime::Impl {
   mutable Mutex sessions_mutex{LockRank::sessions};
   Subscribers<SessionSubscriber> sessions OSTEON_GUARDED_BY(sessions_mutex);
   std::map<AuthorId, SessionSubscriber*> open_authors OSTEON_GUARDED_BY(sessions_mutex);
+  Subscribers<FieldSubscriber> field_readers OSTEON_GUARDED_BY(sessions_mutex);
 
   std::optional<BoneMount> mount;  // from the beginning
   Presence people;

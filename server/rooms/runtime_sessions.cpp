@@ -75,6 +75,10 @@ void RoomRuntime::Impl::decide(QueuedCut& queued) {
         sessions.each([&](SessionSubscriber& one) { one.enqueue(message); });
       else if (author != open_authors.end())
         repeated ? author->second->answer(message) : author->second->enqueue(message);
+      if (!repeated && field_readers.size() > 0) {
+        const SessionMessage said = to_all ? message : noted_message(message.seq, {});
+        field_readers.each([&](FieldSubscriber& one) { one.enqueue(said); });
+      }
     }
     if (durable && newly) metrics.acknowledged(done, kept, Clock::now());
     if (durable && newly) people.took_cut(subscriber->author());
@@ -113,10 +117,12 @@ void RoomRuntime::Impl::decide(QueuedEvent& queued) {
         sessions.each([&](SessionSubscriber& subscriber) { subscriber.know_tool(number, event->tool->hash); });
       }
       for (const EventMessages& one : sent)
-        for (const SessionMessage& message : one.messages)
+        for (const SessionMessage& message : one.messages) {
           sessions.each([&](SessionSubscriber& subscriber) {
             subscriber.enqueue(one.personal.is_for(subscriber.author()) ? *one.personal.message : message);
           });
+          field_readers.each([&](FieldSubscriber& reader) { reader.enqueue(message); });
+        }
     }
     answer(event);
   });
@@ -174,6 +180,7 @@ void RoomRuntime::Impl::end_sessions(const std::string& why, bool to_return) {
   ended = why;
   may_return = to_return;
   sessions.each([&](SessionSubscriber& subscriber) { to_return ? subscriber.replaced(why) : subscriber.end(why); });
+  field_readers.each([&](FieldSubscriber& reader) { reader.end(why); });
 }
 
 Result<void> RoomRuntime::check_witness(const Witness& kept) {
@@ -234,19 +241,46 @@ Result<AuthorId> RoomRuntime::join(MemberKind kind, const std::string& name, con
   return answer.get_future().get();
 }
 
-SessionStart RoomRuntime::Impl::start_of_session(AuthorId author, const People::Supervised& held, const Decider& by) {
+SessionStart RoomRuntime::Impl::start_of_field() {
   SessionStart start;
   start.contained = room.room_seq();
-  start.decided_author_seq = room.decided(author);
-  start.lease_epoch = room.lease_epoch(author);
   start.bodies = room.bodies();
   for (const ToolBox::Entry* entry : room.tools()->entries())
     start.before.push_back(tool_message(RoomSeq{}, entry->tool, number_of(entry->hash)));
+  start.complete = complete_message(start, {});
+  return start;
+}
+
+SessionStart RoomRuntime::Impl::start_of_session(AuthorId author, const People::Supervised& held, const Decider& by) {
+  SessionStart start = start_of_field();
+  start.decided_author_seq = room.decided(author);
+  start.lease_epoch = room.lease_epoch(author);
   start.before.push_back(scene_message(start.contained, room.items()));
   // The client is sent its restrictions before it can cut, also the message that there are none any more.
   if (held.seq) start.before.push_back(supervised_message(RoomSeq{}, held.supervision, start.lease_epoch, by));
   start.complete = complete_message(start, room.decided_seqs(author, kMostRepeatedResults));
   return start;
+}
+
+std::vector<FieldLeaf> RoomRuntime::Impl::places_of_leaves() const {
+  std::vector<FieldLeaf> leaves;
+  for (const BodyId body : room.bodies())
+    std::ranges::move(room.find_field(body)->leaf_places(), std::back_inserter(leaves));
+  return leaves;
+}
+
+template <class Receiver>
+void RoomRuntime::Impl::give_leaves(RoomRuntime& runtime, const std::shared_ptr<Receiver>& receiver,
+                                    std::vector<FieldLeaf> leaves) {
+  read_leaves(leaves);
+  if (!store) return receiver->set_leaves(std::move(leaves));
+  // What the receiver begins with may not be durable yet, and `complete` says that it is decided. So the receiver
+  // sends nothing before it has the leaves, and it gets them once everything is durable. Datagrams do not come sooner
+  // either, since their keys are sent with the rest.
+  runtime.queue_event([](Room&) { return RoomEvent{}; },
+                      [receiver, leaves = std::move(leaves)](const Result<RoomEvent>& kept) mutable {
+                        if (kept) receiver->set_leaves(std::move(leaves));
+                      });
 }
 
 Result<void> RoomRuntime::open_session(const std::shared_ptr<SessionSubscriber>& subscriber, const Digest& secret) {
@@ -259,8 +293,7 @@ Result<void> RoomRuntime::open_session(const std::shared_ptr<SessionSubscriber>&
     if (!impl_->room.may_cut(subscriber->author()))
       return failure(ErrorCode::invalid_input, "open.author " + std::to_string(subscriber->author().value) +
                                                    " has not joined this room as a haptic client; call Join first");
-    for (const BodyId body : impl_->room.bodies())
-      std::ranges::move(impl_->room.find_field(body)->leaf_places(), std::back_inserter(leaves));
+    leaves = impl_->places_of_leaves();
     const std::vector<const ToolBox::Entry*> tools = impl_->room.tools()->entries();
     const People::Supervised& held = impl_->room.people().supervised(subscriber->author());
     const Decider by{held.by, impl_->people.name_of(held.by)};
@@ -291,18 +324,39 @@ Result<void> RoomRuntime::open_session(const std::shared_ptr<SessionSubscriber>&
     if (impl_->redial) subscriber->answer(*impl_->redial);
     if (impl_->ended) impl_->may_return ? subscriber->replaced(*impl_->ended) : subscriber->end(*impl_->ended);
   }
-  impl_->read_leaves(leaves);
-  if (!impl_->store) {
-    subscriber->set_leaves(std::move(leaves));
-    return {};
+  impl_->give_leaves(*this, subscriber, std::move(leaves));
+  return {};
+}
+
+Result<void> RoomRuntime::watch_field(const std::shared_ptr<FieldSubscriber>& reader) {
+  if (impl_->player)
+    return failure(ErrorCode::unavailable,
+                   "this room shows what happened in another: it sends its surface and not the inside of its bone");
+  std::vector<FieldLeaf> leaves;
+  {
+    // Held until the reader is in the list, as for sessions.
+    const ReaderLock room_lock(impl_->room_mutex);
+    leaves = impl_->places_of_leaves();
+    SessionStart start = impl_->start_of_field();
+    const MutexLock lock(impl_->sessions_mutex);
+    FieldSubscriber* before = nullptr;
+    impl_->field_readers.each([&](FieldSubscriber& one) {
+      if (one.author() == reader->author()) before = &one;
+    });
+    if (!before && impl_->field_readers.size() >= kMostFieldReaders)
+      return failure(ErrorCode::exhausted, std::to_string(kMostFieldReaders) +
+                                               " viewers show the inside of this bone already; close one of them");
+    if (before) {
+      before->end("another connection of the same viewer has replaced it");
+      impl_->field_readers.remove(*before);
+    } else {
+      impl_->people.came(reader->author());
+    }
+    impl_->field_readers.add(*reader);
+    reader->begin(std::move(start));
+    if (impl_->ended) reader->end(*impl_->ended);
   }
-  // What the session begins with may not be durable yet, and `complete` says that it is decided. So the subscriber
-  // sends nothing before it has the leaves, and it gets them once everything is durable. Datagrams do not come sooner
-  // either, since their keys are sent with the rest.
-  queue_event([](Room&) { return RoomEvent{}; },
-              [subscriber, leaves = std::move(leaves)](const Result<RoomEvent>& kept) mutable {
-                if (kept) subscriber->set_leaves(std::move(leaves));
-              });
+  impl_->give_leaves(*this, reader, std::move(leaves));
   return {};
 }
 
@@ -349,6 +403,14 @@ void RoomRuntime::leave(SessionSubscriber& subscriber) {
   if (!was_open) return;
   impl_->board.session_over(subscriber.author());
   impl_->people.went(subscriber.author());
+}
+
+void RoomRuntime::leave(FieldSubscriber& reader) {
+  {
+    const MutexLock lock(impl_->sessions_mutex);
+    if (!impl_->field_readers.remove(reader)) return;
+  }
+  impl_->people.went(reader.author());
 }
 
 void RoomRuntime::ask_to_redial(std::chrono::milliseconds after, const std::string& why) {

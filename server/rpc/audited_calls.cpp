@@ -106,6 +106,7 @@ constexpr std::array kAudited{
     Row{"/osteon.v1.RoomService/Join", describe_join, describe_joined},
     Row{"/osteon.v1.CuttingService/Session", nullptr, nullptr, true},
     Row{"/osteon.v1.RoomService/GetCase", nullptr, nullptr, true},
+    Row{"/osteon.v1.FieldService/WatchField", nullptr, nullptr, true},
     Row{"/osteon.v1.RoomService/SaveFields", describe_save},
     Row{"/osteon.v1.RoomService/RemoveBody"},
     Row{"/osteon.v1.PeopleService/Supervise", describe_supervision},

@@ -166,6 +166,7 @@ Result<std::unique_ptr<RoomServer>> RoomServer::start(std::unique_ptr<Rooms> roo
   impl->services.push_back(make_room_service(*impl->rooms));
   impl->services.push_back(make_cutting_service(*impl->rooms, impl->links.get()));
   impl->services.push_back(make_watch_service(*impl->rooms));
+  impl->services.push_back(make_field_service(*impl->rooms));
   impl->services.push_back(make_people_service(*impl->rooms));
   impl->services.push_back(make_plan_service(*impl->rooms));
   impl->services.push_back(make_room_admin_service(*impl->rooms));

@@ -23,6 +23,7 @@ class LinkServer;
 // `links`: the fast path; null: there is none, and everything goes over the streams.
 [[nodiscard]] std::unique_ptr<grpc::Service> make_cutting_service(Rooms& rooms, LinkServer* links);
 [[nodiscard]] std::unique_ptr<grpc::Service> make_watch_service(Rooms& rooms);
+[[nodiscard]] std::unique_ptr<grpc::Service> make_field_service(Rooms& rooms);
 [[nodiscard]] std::unique_ptr<grpc::Service> make_people_service(Rooms& rooms);
 [[nodiscard]] std::unique_ptr<grpc::Service> make_plan_service(Rooms& rooms);
 [[nodiscard]] std::unique_ptr<grpc::Service> make_room_admin_service(Rooms& rooms);

@@ -17,6 +17,7 @@
 #include "common/wire/version.hpp"
 #include "osteon/v1/cases.pb.h"
 #include "osteon/v1/cutting.pb.h"
+#include "osteon/v1/field.pb.h"
 #include "osteon/v1/people.pb.h"
 #include "osteon/v1/room.pb.h"
 #include "osteon/v1/rooms.pb.h"
@@ -211,7 +212,8 @@ const std::vector<const MethodDescriptor*>& methods() {
     for (const google::protobuf::FileDescriptor* file :
          {v1::GetStatusRequest::descriptor()->file(), v1::SessionRequest::descriptor()->file(),
           v1::WatchMeshRequest::descriptor()->file(), v1::ListRoomsRequest::descriptor()->file(),
-          v1::SayRequest::descriptor()->file(), v1::UploadCaseRequest::descriptor()->file()})
+          v1::SayRequest::descriptor()->file(), v1::UploadCaseRequest::descriptor()->file(),
+          v1::WatchFieldRequest::descriptor()->file()})
       for (int s = 0; s < file->service_count(); ++s)
         for (int m = 0; m < file->service(s)->method_count(); ++m) found.push_back(file->service(s)->method(m));
     return found;

@@ -16,6 +16,7 @@
 #include "tests/fuzz/calls_messages.hpp"
 #include "tests/fuzz/calls_target.hpp"
 #include "tests/fuzz/datagram_target.hpp"
+#include "tests/fuzz/field_target.hpp"
 #include "tests/fuzz/import_targets.hpp"
 #include "tests/fuzz/journal_target.hpp"
 #include "tests/fuzz/pointer_target.hpp"
@@ -235,6 +236,7 @@ std::vector<Target> targets() {
       {"annotation", parse_and_convert<v1::Annotation>, {bytes_of(wire::to_wire(an_annotation()).SerializeAsString())}},
       requests_target(),
       calls_target(),
+      field_messages_target(),
       upload_target(),
       mesh_target(),
       tool_file_target(),

@@ -30,7 +30,8 @@ def load_stubs():
     sys.path.insert(0, folder.name)
     modules = {name: importlib.import_module(f"osteon.v1.{name}")
                for name in ("types_pb2", "room_pb2", "room_pb2_grpc", "watch_pb2", "watch_pb2_grpc", "cutting_pb2",
-                            "cutting_pb2_grpc", "link_pb2", "journal_pb2", "people_pb2", "people_pb2_grpc")}
+                            "cutting_pb2_grpc", "field_pb2", "field_pb2_grpc", "link_pb2", "journal_pb2", "people_pb2",
+                            "people_pb2_grpc")}
     return folder, modules
 
 
@@ -38,6 +39,7 @@ _FOLDER, _MODULES = load_stubs()
 types, room, room_grpc = (_MODULES[n] for n in ("types_pb2", "room_pb2", "room_pb2_grpc"))
 watch, watch_grpc = (_MODULES[n] for n in ("watch_pb2", "watch_pb2_grpc"))
 cutting, cutting_grpc, link = (_MODULES[n] for n in ("cutting_pb2", "cutting_pb2_grpc", "link_pb2"))
+field, field_grpc = (_MODULES[n] for n in ("field_pb2", "field_pb2_grpc"))
 journal, people, people_grpc = (_MODULES[n] for n in ("journal_pb2", "people_pb2", "people_pb2_grpc"))
 
 

@@ -10,7 +10,7 @@ import grpc
 
 import client
 import wire
-from client import CODES, cutting, people, people_grpc, room, types, watch
+from client import CODES, cutting, field, field_grpc, people, people_grpc, room, types, watch
 from stage import (CONSOLE, VIEWER, Case, bag, full, metal_case, open_edges, run, stl_triangles,
                    until_cancelled, volume_mm3)
 
@@ -358,6 +358,49 @@ class Watching(Case):
         # The blocks stay as fine as the cuts were, so only their shape is as before.
         self.assertEqual(open_edges(whole), [])
         self.assertAlmostEqual(volume_mm3(whole), volume, delta=0.5)
+
+    def test_the_inside_of_the_bone(self):
+        def key(leaf):
+            return leaf.body, leaf.level, leaf.origin.x, leaf.origin.y, leaf.origin.z
+
+        def digest(leaves):
+            return wire.field_hash(full(leaves), self.hand.joined.pitch_mm)
+        self.groove(self.session, 2)
+        viewer = self.member(VIEWER)
+        stub = field_grpc.FieldServiceStub(viewer.channel)
+
+        def watching(kernel):
+            return stub.WatchField(field.WatchFieldRequest(author=viewer.author, kernel_version=kernel), timeout=60)
+        code, _ = self.refusal(lambda: next(watching(client.KERNEL + 1)))
+        self.assertEqual(code, grpc.StatusCode.FAILED_PRECONDITION)
+        messages = self.messages_of(watching(client.KERNEL))
+        leaves, kinds, message = {}, [], None
+        while kinds[-1:] != ["complete"]:
+            message = messages.get(timeout=30)
+            kinds.append(message.WhichOneof("message"))
+            self.assertEqual(message.index, 0)
+            if message.HasField("leaf"):
+                leaves[key(message.leaf)] = message.leaf.values
+        self.assertEqual([kind for i, kind in enumerate(kinds) if kinds[i - 1] != kind], ["tool", "leaf", "complete"])
+        self.assertEqual(list(message.complete.bodies), [0])
+        self.assertEqual(digest(leaves), self.hand.status().field_hash)
+
+        # A cut, a cut that the room rejects, and an undo.
+        cut = self.groove(self.session, 1, y=3.0)[0][1]
+        wrong = self.session.send_cut(self.session.cut(self.burr, [(0, 0, -1)], body=9))
+        rejected = self.session.decided(wrong)[1]
+        undone = self.hand.rooms.Undo(room.UndoRequest(author=self.hand.author, all=True), timeout=20).room_seq
+        events = []
+        while not events or not events[-1].change.last:
+            events.append(messages.get(timeout=30))
+        self.assertEqual([e.index for e in events], list(range(1, len(events) + 1)))
+        self.assertEqual([(e.WhichOneof("message"), e.committed.room_seq + e.noted.room_seq) for e in events[:2]],
+                         [("committed", cut), ("noted", rejected)])
+        for event in events[2:]:
+            self.assertEqual((event.change.room_seq, list(event.change.bodies)), (undone, [0]))
+            leaves.update((key(leaf), leaf.values) for leaf in event.change.leaves)
+        self.assertEqual(digest(leaves), self.hand.status().field_hash)
+        self.assertEqual(digest(leaves), digest({}))
 
     def test_who_has_heard_of_what(self):
         console = self.member(CONSOLE, "ada")

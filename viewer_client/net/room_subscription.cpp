@@ -16,6 +16,7 @@
 #include "osteon/v1/plan.grpc.pb.h"
 #include "osteon/v1/room.grpc.pb.h"
 #include "osteon/v1/watch.grpc.pb.h"
+#include "viewer_client/net/field_source.hpp"
 #include "viewer_client/net/open_requests.hpp"
 
 namespace osteon {
@@ -177,6 +178,7 @@ struct RoomSubscription::Impl {
   grpc::ClientContext* look_context OSTEON_GUARDED_BY(mutex) = nullptr;
   grpc::ClientContext* plan_context OSTEON_GUARDED_BY(mutex) = nullptr;
   std::optional<Error> failed OSTEON_GUARDED_BY(mutex);
+  std::shared_ptr<HeldBone> held OSTEON_GUARDED_BY(mutex);  // shared with whoever looks at it
   std::optional<ViewFrustum> newest_look OSTEON_GUARDED_BY(mutex), said_look OSTEON_GUARDED_BY(mutex);
 
   std::thread mesh_thread, cutting_thread, look_thread, plan_thread;
@@ -506,6 +508,8 @@ Result<std::unique_ptr<RoomSubscription>> RoomSubscription::start(const RoomSubs
 
 void RoomSubscription::end() {
   impl_->requests.cancel_all();
+  // Its lock comes before this one.
+  if (const std::shared_ptr<HeldBone> held = held_bone()) held->end();
   const MutexLock lock(impl_->mutex);
   impl_->ending = true;
   if (impl_->mesh_context != nullptr) impl_->mesh_context->TryCancel();
@@ -517,6 +521,7 @@ void RoomSubscription::end() {
 
 RoomSubscription::~RoomSubscription() {
   end();
+  hold_bone(false);
   impl_->mesh_thread.join();
   impl_->cutting_thread.join();
   impl_->look_thread.join();
@@ -539,6 +544,23 @@ void RoomSubscription::look(const ViewFrustum& from) {
   const MutexLock lock(impl_->mutex);
   impl_->newest_look = from;
   impl_->changed.notify_all();
+}
+
+void RoomSubscription::hold_bone(bool wanted) {
+  if (wanted == (held_bone() != nullptr)) return;
+  std::shared_ptr<HeldBone> made;  // shared as `held` is
+  if (wanted)
+    made = HeldBone::start(field_of_server({.room = [&at = *impl_] { return at.newest_join(); },
+                                            .cache = impl_->options.cache,
+                                            .patience = impl_->options.patience}));
+  const MutexLock lock(impl_->mutex);
+  std::swap(impl_->held, made);
+  if (impl_->ending && impl_->held) std::swap(impl_->held, made);
+}
+
+std::shared_ptr<HeldBone> RoomSubscription::held_bone() const {
+  const MutexLock lock(impl_->mutex);
+  return impl_->held;
 }
 
 bool RoomSubscription::interrupted() const { return impl_->interrupted.load(); }

@@ -2,6 +2,7 @@
 // plan.
 #pragma once
 #include <chrono>
+#include <filesystem>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -11,8 +12,10 @@
 #include "common/core/result.hpp"
 #include "common/geometry/lattice.hpp"
 #include "common/surface/view_frustum.hpp"
+#include "common/volume/case_cache.hpp"
 #include "common/wire/credentials.hpp"
 #include "common/wire/room_client.hpp"
+#include "viewer_client/net/held_bone.hpp"
 #include "viewer_client/scene/item_place.hpp"
 #include "viewer_client/scene/render_queue.hpp"
 #include "viewer_client/scene/room_answer.hpp"
@@ -26,8 +29,9 @@ struct RoomSubscriptionOptions {
   std::string name = "viewer";  // shown to others
   std::chrono::milliseconds patience{5000};
   // The window's first view of a bone with these bounds. None: the whole bone in full detail.
-  std::function<ViewFrustum(const Box&)> first_look;
+  std::function<ViewFrustum(const Box&)> first_look{};
   bool keep_trying = false;  // after a lost connection: retry without end, not only for `patience`
+  std::filesystem::path cache = default_case_cache();  // of the cases of hold_bone()
 };
 
 struct WatchedRoom {
@@ -59,6 +63,12 @@ class RoomSubscription {
 
   // Sets the window's view; returns at once. The server receives real changes only, at most 4 times a second.
   void look(const ViewFrustum& from);
+
+  // Whether a picture of the bone's inside is shown: then its case is fetched, and a fifth thread follows each cut. Off
+  // at first; nothing of it is sent or kept then. Waits for the end of that thread when it is switched off.
+  void hold_bone(bool wanted);
+  // Null while it is off. Shared with whoever looks at the bone at the moment.
+  [[nodiscard]] std::shared_ptr<HeldBone> held_bone() const;
 
   // Requests to the room. Each waits for the answer. Errors: invalid_input, not_found (no such tool or item),
   // unavailable (nothing to undo, no answer).

@@ -47,7 +47,8 @@ Names allowed(Role role) {
   if (role >= Role::observer)
     names.insert({room + "Join", room + "GetStatus", room + "GetCase", room + "ListTools", room + "GetTool",
                   watch + "WatchMesh", watch + "WatchCutting", watch + "LookFrom", people + "WatchPeople",
-                  "/osteon.v1.PlanService/GetPlan", "/osteon.v1.PlanService/GetDensity"});
+                  "/osteon.v1.PlanService/GetPlan", "/osteon.v1.PlanService/GetDensity",
+                  "/osteon.v1.FieldService/WatchField"});
   if (role >= Role::trainee)
     names.insert({"/osteon.v1.CuttingService/Session", room + "AddTool", room + "Undo", room + "Redo", room + "Mark",
                   room + "SetSceneItem", room + "RemoveSceneItem", people + "Say"});
@@ -102,7 +103,7 @@ TEST(RoleTable, ShowsOthersToTheInstructorAlone) {
     EXPECT_EQ(may_receive(role, StreamContent::people), in_room);
     EXPECT_EQ(may_receive(role, StreamContent::own_words), in_room);
     EXPECT_EQ(may_receive(role, StreamContent::own_supervision), in_room);
-    EXPECT_EQ(may_receive(role, StreamContent::field), in_room && role != Role::observer);
+    EXPECT_EQ(may_receive(role, StreamContent::field), in_room);
     EXPECT_EQ(may_receive(role, StreamContent::others_words), role == Role::instructor);
     EXPECT_EQ(may_receive(role, StreamContent::others_supervision), role == Role::instructor);
   }

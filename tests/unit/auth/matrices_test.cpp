@@ -12,9 +12,11 @@
 #include <string>
 #include <thread>
 
+#include "common/field/kernel.hpp"
 #include "common/link/udp_port.hpp"
 #include "common/wire/client_link.hpp"
 #include "common/wire/room_client.hpp"
+#include "osteon/v1/field.grpc.pb.h"
 #include "osteon/v1/people.grpc.pb.h"
 #include "server/rpc/room_server.hpp"
 #include "tests/support/authentication/people.hpp"
@@ -91,6 +93,18 @@ class Member {
                                                                     for (const auto& state : said.states())
                                                                       note_tool(state.author());
                                                                   });
+    v1::WatchFieldRequest inside;
+    inside.set_author(room.author.value);
+    inside.set_kernel_version(kKernelVersion);
+    auto of_field = context();
+    auto field_stream = v1::FieldService::NewStub(room.channel)->WatchField(of_field.get(), inside);
+    field_ = std::make_unique<Reader<v1::WatchFieldResponse>>(
+        std::move(of_field), std::move(field_stream), [this](const v1::WatchFieldResponse& said) {
+          note(said.has_leaf() || said.has_committed() || said.has_change(), "field field");
+          // Nothing of what was said or decided.
+          for (const char* secret : {"to sue", "to the reader", "gently"})
+            note(said.SerializeAsString().find(secret) != std::string::npos, std::string("field ") + secret);
+        });
     v1::WatchPeopleRequest asked;
     asked.set_author(room.author.value);
     auto of_people = context();
@@ -132,7 +146,7 @@ class Member {
   }
 
   void leave() {
-    mesh_.reset(), cutting_.reset(), people_.reset();
+    mesh_.reset(), cutting_.reset(), field_.reset(), people_.reset();
     if (session_thread_.joinable()) {
       session_context_->TryCancel();
       session_thread_.join();
@@ -176,6 +190,7 @@ class Member {
   std::optional<grpc::Status> session_end_;
   std::unique_ptr<Reader<v1::WatchMeshResponse>> mesh_;
   std::unique_ptr<Reader<v1::WatchCuttingResponse>> cutting_;
+  std::unique_ptr<Reader<v1::WatchFieldResponse>> field_;
   std::unique_ptr<Reader<v1::WatchPeopleResponse>> people_;
   std::unique_ptr<grpc::ClientContext> session_context_;
   std::unique_ptr<grpc::ClientReaderWriter<v1::SessionRequest, v1::SessionResponse>> session_;
@@ -321,7 +336,7 @@ class Matrices : public ::testing::Test {
 constexpr Role kHands[] = {Role::trainee, Role::collaborator, Role::instructor};
 
 TEST_F(Matrices, EveryStreamSendsEveryRoleWhatIsForIt) {
-  const Seen of_watchers{"mesh surface",  "cutting tool_states", "cutting scene",
+  const Seen of_watchers{"mesh surface",  "cutting tool_states", "cutting scene",   "field field",
                          "people people", "people scene",        "people own_words"};
   const Seen of_hands{"people own_supervision", "session field",           "session scene",
                       "session tool_states",    "session own_supervision", "session own_words"};
@@ -356,6 +371,43 @@ TEST_F(Matrices, NoStreamSendsAnOperatorAnythingOfARoom) {
   const auto joined = wire::join_room(address(), wire::ClientKind::viewer, "whatever", 5s, {}, "ward", credentials);
   ASSERT_FALSE(joined);
   EXPECT_THAT(joined.error().message, HasSubstr("an operator may not call"));
+}
+
+TEST_F(Matrices, TheInsideOfTheBoneIsForWhoIsInTheRoomAndNoLonger) {
+  const auto end_of = [&](const wire::JoinedRoom& room, std::promise<void>* begun = nullptr) {
+    v1::WatchFieldRequest request;
+    request.set_author(room.author.value);
+    request.set_kernel_version(kKernelVersion);
+    grpc::ClientContext context;
+    const auto stream = v1::FieldService::NewStub(room.channel)->WatchField(&context, request);
+    v1::WatchFieldResponse said;
+    while (stream->Read(&said))
+      if (begun) std::exchange(begun, nullptr)->set_value();
+    return stream->Finish();
+  };
+  // An operator's ticket, over the connection of somebody who is in the room.
+  auto channel = wire::reach_server(address(), wire::ClientKind::viewer, 5s, {},
+                                    people_.credentials("otto", Role::operator_, "ward"));
+  ASSERT_TRUE(channel) << channel.error().message;
+  wire::JoinedRoom otto;
+  otto.channel = *channel;
+  otto.author = ina_;
+  const grpc::Status refused = end_of(otto);
+  EXPECT_EQ(refused.error_code(), StatusCode::PERMISSION_DENIED);
+  EXPECT_THAT(refused.error_message(), HasSubstr("an operator may not call WatchField"));
+  // Somebody else's author.
+  wire::JoinedRoom olga = join(people_.credentials("olga", Role::observer, "ward"), wire::ClientKind::viewer);
+  olga.author = ina_;
+  EXPECT_EQ(end_of(olga).error_code(), StatusCode::PERMISSION_DENIED);
+  // An observer who loses the role while the stream is open.
+  const wire::JoinedRoom ned = join(people_.credentials("ned", Role::observer, "ward"), wire::ClientKind::viewer);
+  std::promise<void> begun;
+  std::promise<grpc::Status> end;
+  std::thread reader([&] { end.set_value(end_of(ned, &begun)); });
+  begun.get_future().wait();
+  people_.append_access("role ned operator ward");
+  EXPECT_EQ(end.get_future().get().error_code(), StatusCode::PERMISSION_DENIED);
+  reader.join();
 }
 
 TEST_F(Matrices, DatagramsBringEveryHapticClientAllThatIsForIt) {

@@ -1,0 +1,135 @@
+// A room in this process, and connections to it that keep the messages of the field's stream. A test hands these to a
+// viewer as a good or a bad network would.
+#pragma once
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "osteon/v1/field.pb.h"
+#include "server/rooms/room_runtime.hpp"
+#include "tests/unit/room/cuts.hpp"
+#include "tests/unit/rooms/fake_session.hpp"
+
+namespace osteon::test {
+
+using FieldMessages = std::vector<v1::WatchFieldResponse>;
+
+// The room's end of a stream. Any thread.
+class FieldTap final : public FieldSubscriber {
+ public:
+  explicit FieldTap(AuthorId author) : author_(author) {}
+  AuthorId author() const override { return author_; }
+  void begin(SessionStart start) override {
+    const std::lock_guard lock(mutex_);
+    MessageParts before;
+    for (const SessionMessage& message : start.before) before.push_back(message.bytes);
+    queue_.begin(start.contained, std::move(before), std::move(start.complete));
+  }
+  void set_leaves(std::vector<FieldLeaf> leaves) override {
+    const std::lock_guard lock(mutex_);
+    queue_.set_leaves(std::move(leaves));
+  }
+  void enqueue(const SessionMessage& message) override {
+    const std::lock_guard lock(mutex_);
+    EXPECT_TRUE(queue_.add(message.seq, field_entry(message, true)));
+  }
+  void end(const std::string& why) override {
+    const std::lock_guard lock(mutex_);
+    ended_ = why;
+  }
+  std::size_t waiting() const override {
+    const std::lock_guard lock(mutex_);
+    return queue_.waiting();
+  }
+
+  // What was sent since the last call.
+  FieldMessages read() {
+    const std::lock_guard lock(mutex_);
+    FieldMessages messages;
+    for (MessageParts parts = queue_.take(); !parts.empty(); parts = queue_.take()) {
+      std::string whole;
+      for (const Bytes& part : parts) whole += *part;
+      EXPECT_TRUE(messages.emplace_back().ParseFromString(whole));
+    }
+    return messages;
+  }
+  std::string ended() const {
+    const std::lock_guard lock(mutex_);
+    return ended_;
+  }
+
+ private:
+  const AuthorId author_;
+  mutable std::mutex mutex_;
+  SessionSendQueue queue_;
+  std::string ended_;
+};
+
+// Driven by the test: nothing happens between its ticks.
+class FollowedRoom {
+ public:
+  explicit FollowedRoom(const Case& bone) : runtime_(Room(bone), driven(), nullptr) {
+    hand_ = join(MemberKind::surgeon, "Ben", Role::trainee);
+    viewer_ = join(MemberKind::watcher, "Ada", Role::instructor);
+    sender_ = std::make_shared<FakeSession>(hand_);
+  }
+
+  RoomRuntime& runtime() { return runtime_; }
+  AuthorId hand() const { return hand_; }
+  AuthorId viewer() const { return viewer_; }
+  BoneStatus status() { return runtime_.bone_status(); }
+
+  std::shared_ptr<FieldTap> open() {
+    taps_.push_back(std::make_shared<FieldTap>(viewer_));
+    EXPECT_TRUE(runtime_.watch_field(taps_.back()));
+    return taps_.back();
+  }
+  // Strokes at random places. They count as the hand's next cuts.
+  void cut(int count) {
+    for (int i = 0; i < count; ++i) {
+      Cut cut = strokes(hand_, ++cuts_, 5).back();
+      cut.lease_epoch = runtime_.lease_epoch(hand_);
+      runtime_.queue_cut(sender_, cut, {});
+      tick();
+    }
+  }
+  void happen(std::function<Result<RoomEvent>(Room&)> change) {
+    bool happened = false;
+    runtime_.queue_event(std::move(change), [&](const Result<RoomEvent>& event) {
+      happened = event.has_value();
+      EXPECT_TRUE(event) << event.error().message;
+    });
+    tick();
+    EXPECT_TRUE(happened);
+  }
+  void tick() { runtime_.tick(now_ += std::chrono::milliseconds(8)); }
+
+ private:
+  static RuntimeRates driven() {
+    RuntimeRates rates;
+    rates.tick = rates.pieces = std::chrono::nanoseconds(0);
+    rates.mesh = std::chrono::seconds(1);
+    return rates;
+  }
+  AuthorId join(MemberKind kind, const std::string& name, Role role) {
+    AuthorId author;
+    runtime_.join(kind, name, {}, role, [&](const Result<AuthorId>& given) { author = given.value(); });
+    tick();
+    return author;
+  }
+
+  std::vector<std::shared_ptr<FieldTap>> taps_;  // the runtime uses them until its end
+  std::shared_ptr<FakeSession> sender_;
+  RoomRuntime runtime_;
+  AuthorId hand_, viewer_;
+  std::chrono::nanoseconds now_{};
+  int cuts_ = 0;
+};
+
+}  // namespace osteon::test

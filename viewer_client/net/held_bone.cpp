@@ -1,0 +1,175 @@
+#include "viewer_client/net/held_bone.hpp"
+
+#include <thread>
+#include <utility>
+
+#include "common/core/mutex.hpp"
+#include "common/link/backoff.hpp"
+#include "common/runtime/log.hpp"
+
+namespace osteon {
+
+struct HeldBone::Impl {
+  Impl(std::unique_ptr<FieldSource> from, const HeldBoneOptions& given) : source(std::move(from)), options(given) {}
+
+  const std::unique_ptr<FieldSource> source;
+  const HeldBoneOptions options;
+
+  mutable Mutex mutex{LockRank::received};
+  mutable CondVar changed;
+  bool ending OSTEON_GUARDED_BY(mutex) = false;
+  std::optional<FieldFollower> follower OSTEON_GUARDED_BY(mutex);
+  HeldBoneStatus status OSTEON_GUARDED_BY(mutex);
+
+  std::thread thread;
+
+  void run();
+  // True: the bone was fetched.
+  bool fetch(Backoff& backoff);
+  [[nodiscard]] FieldSource::End follow(Backoff& backoff);
+  [[nodiscard]] Result<void> take(const v1::WatchFieldResponse& message);
+  // Returns false when it ends.
+  bool pause(Backoff& backoff);
+  void interrupt(const Error& why);
+  void fail(const Error& why);
+};
+
+// [bone thread]
+void HeldBone::Impl::run() {
+  Backoff backoff(static_cast<std::uint64_t>(std::chrono::steady_clock::now().time_since_epoch().count()),
+                  {.least = options.pause, .most = options.longest_pause});
+  if (!fetch(backoff)) return;
+  while (true) {
+    const FieldSource::End end = follow(backoff);
+    if (end.for_good) return fail(end.why);
+    interrupt(end.why);
+    if (!pause(backoff)) return;
+  }
+}
+
+bool HeldBone::Impl::fetch(Backoff& backoff) {
+  while (true) {
+    const Result<Case> bone = source->imported();
+    if (bone) {
+      const MutexLock lock(mutex);
+      follower.emplace(*bone, options.most_bytes);
+      return true;
+    }
+    if (bone.error().code != ErrorCode::unavailable) {
+      fail(bone.error());
+      return false;
+    }
+    interrupt(bone.error());
+    if (!pause(backoff)) return false;
+  }
+}
+
+// One stream, from its beginning to its end.
+FieldSource::End HeldBone::Impl::follow(Backoff& backoff) {
+  {
+    const MutexLock lock(mutex);
+    follower->begin();
+  }
+  std::optional<Error> fault;
+  bool followed = false;
+  FieldSource::End end = source->read([&](const v1::WatchFieldResponse& message) {
+    const Result<void> taken = take(message);
+    if (!taken) fault = taken.error();
+    if (taken && !followed) {
+      const MutexLock lock(mutex);
+      followed = follower->follows();
+    }
+    return taken.has_value();
+  });
+  if (followed) backoff.reset();
+  if (fault) end = {*fault, fault->code != ErrorCode::unavailable};
+  return end;
+}
+
+Result<void> HeldBone::Impl::take(const v1::WatchFieldResponse& message) {
+  const MutexLock lock(mutex);
+  if (ending) return failure(ErrorCode::unavailable, "it ends");
+  Result<void> taken = follower->take(message);
+  status.bytes = follower->bytes();
+  if (!taken || !follower->follows()) return taken;
+  if (status.state != HeldBoneState::follows) status.why.reset();
+  status.state = HeldBoneState::follows;
+  status.room_seq = follower->bone().room_seq();
+  status.bodies = follower->bone().bodies().size();
+  changed.notify_all();
+  return taken;
+}
+
+bool HeldBone::Impl::pause(Backoff& backoff) {
+  MutexLock lock(mutex);
+  changed.wait_for(lock, backoff.next(), [&]() OSTEON_REQUIRES(mutex) { return ending; });
+  if (!ending) ++status.asked_again;
+  return !ending;
+}
+
+void HeldBone::Impl::interrupt(const Error& why) {
+  const MutexLock lock(mutex);
+  if (ending) return;
+  if (status.state == HeldBoneState::follows)
+    log::warn("the inside of the bone is asked for again", {{"reason", why.message}});
+  if (follower && follower->whole()) status.state = HeldBoneState::interrupted;
+  status.why = why;
+  changed.notify_all();
+}
+
+void HeldBone::Impl::fail(const Error& why) {
+  const MutexLock lock(mutex);
+  if (ending) return;
+  log::warn("the inside of the bone is not shown", {{"reason", why.message}});
+  follower.reset();
+  status.state = HeldBoneState::failed;
+  status.bodies = status.bytes = 0;
+  status.why = why;
+  changed.notify_all();
+}
+
+HeldBone::HeldBone(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+
+std::unique_ptr<HeldBone> HeldBone::start(std::unique_ptr<FieldSource> source, const HeldBoneOptions& options) {
+  std::unique_ptr<HeldBone> bone(new HeldBone(std::make_unique<Impl>(std::move(source), options)));
+  bone->impl_->thread = std::thread([inside = bone->impl_.get()] { inside->run(); });
+  return bone;
+}
+
+HeldBone::~HeldBone() {
+  end();
+  impl_->thread.join();
+}
+
+void HeldBone::end() {
+  {
+    const MutexLock lock(impl_->mutex);
+    impl_->ending = true;
+    impl_->changed.notify_all();
+  }
+  impl_->source->cancel();
+}
+
+HeldBoneStatus HeldBone::status() const {
+  const MutexLock lock(impl_->mutex);
+  return impl_->status;
+}
+
+bool HeldBone::read(const std::function<void(const Replica& bone)>& use) const {
+  const MutexLock lock(impl_->mutex);
+  if (!impl_->follower || !impl_->follower->whole()) return false;
+  use(impl_->follower->bone());
+  return true;
+}
+
+FieldChanges HeldBone::take_changes() {
+  const MutexLock lock(impl_->mutex);
+  return impl_->follower ? impl_->follower->take_changes() : FieldChanges{.all = true};
+}
+
+bool HeldBone::wait(const std::function<bool(const HeldBoneStatus&)>& done, std::chrono::milliseconds patience) const {
+  MutexLock lock(impl_->mutex);
+  return impl_->changed.wait_for(lock, patience, [&]() OSTEON_REQUIRES(impl_->mutex) { return done(impl_->status); });
+}
+
+}  // namespace osteon
