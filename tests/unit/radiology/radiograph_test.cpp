@@ -7,9 +7,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
+#include <functional>
+#include <numbers>
 
 #include "common/radiology/attenuation.hpp"
 #include "common/radiology/sampling.hpp"
+#include "common/tools/implicit.hpp"
 #include "tests/support/scenes/random_cuts.hpp"
 
 namespace osteon::radiology {
@@ -112,7 +116,6 @@ void expect_closed_form(const Box& extent, const Distance& distance,
   }
   EXPECT_LT(found[0].rms, 0.01);
   EXPECT_LT(found[1].rms, found[0].rms / least_order);
-  RecordProperty("rms_percent", std::to_string(100.0 * found[0].rms));
   std::printf("[ error    ] of the range: rms %.3f %%, worst %.3f %%; at half the pitch %.3f %%, %.3f %%\n",
               100.0 * found[0].rms, 100.0 * found[0].worst, 100.0 * found[1].rms, 100.0 * found[1].worst);
 }
