@@ -22,4 +22,20 @@ inline constexpr double kCorticalBone_hu = 1593.5;
   return hu <= -1000.0 ? 0.0 : hu <= 0.0 ? water : bone;
 }
 
+// Attenuation is kept in steps of a part of water's, because it is in proportion to the matter in a voxel: half a voxel
+// of bone weakens a ray half as much. HU above water are not: they rise less than attenuation does.
+inline constexpr float kAir_hu = -1000.0f;
+inline constexpr float kStepsOfWater = 4000.0f;
+inline constexpr double kStep_per_mm = kWater_per_mm / static_cast<double>(kStepsOfWater);
+inline constexpr float kHuPerStepBelowWater = 0.25f;
+inline constexpr float kHuPerStepAboveWater =
+    static_cast<float>(kStep_per_mm * kCorticalBone_hu / (kCorticalBone_per_mm - kWater_per_mm));  // 0.154 HU
+
+// HU of some steps: the inverse of attenuation_per_mm().
+[[nodiscard]] constexpr float hu_of_steps(float steps) {
+  const float water = steps < kStepsOfWater ? steps : kStepsOfWater;
+  const float bone = steps - kStepsOfWater > 0.0f ? steps - kStepsOfWater : 0.0f;
+  return (water * kHuPerStepBelowWater + kAir_hu) + bone * kHuPerStepAboveWater;
+}
+
 }  // namespace osteon::radiology

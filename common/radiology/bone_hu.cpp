@@ -12,16 +12,16 @@ namespace osteon::radiology {
 namespace {
 
 constexpr std::int32_t kBrick = 8;
-constexpr float kStepsPerHu = 1.0f / kStep_hu;
 
 std::size_t samples_in(const CoordBox& box) {
   const Coord d = box.dims();
   return to_index(d.x) * to_index(d.y) * to_index(d.z);
 }
 
-std::uint16_t to_steps(float above_air_hu) {
+std::uint16_t to_steps(double hu, float part = 1.0f) {
   constexpr float most = std::numeric_limits<std::uint16_t>::max();
-  return static_cast<std::uint16_t>(std::clamp(above_air_hu * kStepsPerHu, 0.0f, most - 0.5f) + 0.5f);
+  const auto steps = static_cast<float>(attenuation_per_mm(hu) / kStep_per_mm);
+  return static_cast<std::uint16_t>(std::min(part * steps, most - 0.5f) + 0.5f);
 }
 
 // The part of a sample's voxel that is solid, from the distance to the surface.
@@ -186,7 +186,7 @@ void BoneHu::fill_from_density() {
       for (std::int32_t y = part.min.y; y <= part.max.y; ++y) {
         std::uint16_t* to = uncut_.data() + index({x, y, part.min.z});
         for (std::int32_t z = part.min.z; z <= part.max.z; ++z, ++i, ++to)
-          *to = to_steps(solid_part(surface[i], pitch) * ((density[i] - intercept) / slope - kAir_hu));
+          *to = to_steps(static_cast<double>((density[i] - intercept) / slope), solid_part(surface[i], pitch));
       }
   });
 }
@@ -199,7 +199,7 @@ void BoneHu::fill_from_scan(const CaseScan& scan) {
       std::uint16_t* to = uncut_.data() + index({x, y, box_.min.z});
       for (std::int32_t z = box_.min.z; z <= box_.max.z; ++z, ++to) {
         const Vec3 voxel = to_voxels * (position_mm({x, y, z}, pitch_mm()) - scan.geometry.origin_mm);
-        *to = to_steps(scan_hu(scan, voxel) - kAir_hu);
+        *to = to_steps(static_cast<double>(scan_hu(scan, voxel)));
       }
     }
 }
@@ -210,7 +210,11 @@ std::size_t BoneHu::index(Coord sample) const {
 }
 
 float BoneHu::hu(Coord sample) const {
-  return box_.contains(sample) ? kAir_hu + kStep_hu * static_cast<float>(steps_[index(sample)]) : kAir_hu;
+  return box_.contains(sample) ? hu_of_steps(static_cast<float>(steps_[index(sample)])) : kAir_hu;
+}
+
+double BoneHu::attenuation_per_mm(Coord sample) const {
+  return box_.contains(sample) ? kStep_per_mm * steps_[index(sample)] : 0.0;
 }
 
 HuLattice BoneHu::lattice() const { return {steps_.data(), dims_, occupied_.data(), bricks_}; }

@@ -2,23 +2,21 @@
 // cut away. Slices and radiographs read it.
 #pragma once
 #include <cstdint>
-#include <optional>
 #include <span>
 #include <vector>
 
 #include "common/core/result.hpp"
+#include "common/radiology/attenuation.hpp"
 #include "common/volume/case_scan.hpp"
 #include "common/volume/replica.hpp"
 
 namespace osteon::radiology {
 
-// Air, and the finest step of HU that is kept.
-inline constexpr float kAir_hu = -1000.0f, kStep_hu = 0.25f;
 // Density without a line of its own, as of a phantom or a mesh, becomes HU by this one (Rho 1995).
 inline constexpr DensityCalibration kDefaultLine{.slope_g_cm3_per_hu = 0.001067, .intercept_g_cm3 = 0.131};
 
-// What sampling reads: steps of kStep_hu above air, z fastest. All outer samples are air, and one more value follows
-// the last. A brick is a cube of 8 cells, so its samples are 9³; bricks share the samples of their faces.
+// What sampling reads: attenuation in steps (attenuation.hpp), z fastest. All outer samples are air, and one more value
+// follows the last. A brick is a cube of 8 cells, so its samples are 9³; bricks share the samples of their faces.
 struct HuLattice {
   const std::uint16_t* steps = nullptr;
   Coord dims;
@@ -46,6 +44,7 @@ class BoneHu {
   [[nodiscard]] double pitch_mm() const { return bone_.pitch_mm(); }
   [[nodiscard]] const CoordBox& box() const { return box_; }  // samples of level 0; beyond it is air
   [[nodiscard]] float hu(Coord sample) const;
+  [[nodiscard]] double attenuation_per_mm(Coord sample) const;
   [[nodiscard]] HuLattice lattice() const;
   // A position in lattice coordinates, which count samples from the first one of the lattice.
   [[nodiscard]] Vec3 in_lattice(const Vec3& point_mm) const;

@@ -26,12 +26,6 @@ constexpr int kLayer = 8;  // planes of a layer of bricks
 // Added to a range of positions in samples, for rounding.
 constexpr float kMargin = 0.01f;
 
-constexpr double kStepsOfWater = -static_cast<double>(kAir_hu) / static_cast<double>(kStep_hu);
-constexpr double kBoneSlope = (kCorticalBone_per_mm - kWater_per_mm) / kCorticalBone_hu;
-constexpr AttenuationLine kLine{static_cast<float>(kStepsOfWater),
-                                static_cast<float>(kBoneSlope / (kWater_per_mm / 1000.0) - 1.0)};
-constexpr double kStep_per_mm = kWater_per_mm / kStepsOfWater;
-
 // Neighbouring rays of one row with one dominant axis. Lanes without a ray of their own repeat the nearest one, and
 // meet no plane.
 struct Rays {
@@ -185,7 +179,7 @@ void cast_rays(const HuLattice& lattice, std::span<Rays> rays, bool one_axis, in
       for (Rays& r : rays) {
         if (r.axis != axis) continue;
         const std::array<Bricks::Corner, 2> ends{corner_of(r.packet, 0), corner_of(r.packet, kRays - 1)};
-        if (bricks.any(layer, ends)) add_planes(lattice, axis, first, last, r.packet, kLine, r.sums);
+        if (bricks.any(layer, ends)) add_planes(lattice, axis, first, last, r.packet, r.sums);
       }
     }
   }

@@ -72,8 +72,8 @@ void sample_line(const HuLattice& lattice, const std::array<float, 3>& start, co
 }
 
 void add_planes(const HuLattice& lattice, int axis, int first, int last, const RayPacket& rays,
-                const AttenuationLine& line, std::array<float, kRays>& sums) {
-  chosen_sampling().load(std::memory_order_relaxed)->planes(lattice, axis, first, last, rays, line, sums.data());
+                std::array<float, kRays>& sums) {
+  chosen_sampling().load(std::memory_order_relaxed)->planes(lattice, axis, first, last, rays, sums.data());
 }
 
 int limit_sampling_lanes(int lanes) {

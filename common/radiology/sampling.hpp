@@ -21,15 +21,9 @@ struct RayPacket {
   alignas(32) std::array<float, kRays> u, du, v, dv, first, last;
 };
 
-// Attenuation from steps of HU above air, in the same unit for water: s + extra · max(s − water, 0).
-struct AttenuationLine {
-  float water = 0.0f;
-  float extra = 0.0f;
-};
-
-// Adds the attenuation of the planes from `first` to `last` at the rays, bilinear in each plane (Joseph 1982).
+// Adds the steps of the planes from `first` to `last` at the rays, bilinear in each plane (Joseph 1982).
 void add_planes(const HuLattice& lattice, int axis, int first, int last, const RayPacket& rays,
-                const AttenuationLine& line, std::array<float, kRays>& sums);
+                std::array<float, kRays>& sums);
 
 // For tests: limits the number of samples computed at once (4 or 8). Returns the width in use.
 int limit_sampling_lanes(int lanes);

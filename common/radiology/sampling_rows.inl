@@ -61,6 +61,12 @@ OSTEON_INLINE Row in_pairs(const std::uint16_t* plane, RowInt place, std::int32_
   return mixed(mixed(lower_of(a), upper_of(a), along), mixed(lower_of(b), upper_of(b), along), across);
 }
 
+// The same as hu_of_steps().
+OSTEON_INLINE Row hu_rows(Row steps) {
+  const Row water = low(steps, splat(kStepsOfWater)), bone = high(steps - kStepsOfWater, splat(0.0f));
+  return (water * kHuPerStepBelowWater + kAir_hu) + bone * kHuPerStepAboveWater;
+}
+
 void line_rows(const HuLattice& lattice, const float* start, const float* step, int count, float* hu) {
   const std::int32_t nz = lattice.dims.z, plane = lattice.dims.y * nz;
   const std::int32_t dims[3] = {lattice.dims.x, lattice.dims.y, lattice.dims.z};
@@ -72,7 +78,7 @@ void line_rows(const HuLattice& lattice, const float* start, const float* step, 
     const RowInt place = c[0].cell * plane + c[1].cell * nz + c[2].cell;
     const Row near_x = in_pairs(lattice.steps, place, nz, c[1].weight, c[2].weight);
     const Row far_x = in_pairs(lattice.steps, place + plane, nz, c[1].weight, c[2].weight);
-    const Row value = mixed(near_x, far_x, c[0].weight) * kStep_hu + kAir_hu;
+    const Row value = hu_rows(mixed(near_x, far_x, c[0].weight));
     if (first + kLanes <= count) {
       store(hu + first, value);
     } else {
@@ -89,12 +95,12 @@ struct PlaneStrides {
 
 template <bool kPairs>
 void ray_rows(const HuLattice& lattice, const PlaneStrides& s, int first, int last, const RayPacket& rays, int lane,
-              const AttenuationLine& line, float* sums) {
+              float* sums) {
   const auto lanes = static_cast<std::size_t>(lane);
   const Row u = load(rays.u.data() + lanes), du = load(rays.du.data() + lanes), v = load(rays.v.data() + lanes),
             dv = load(rays.dv.data() + lanes), begin = load(rays.first.data() + lanes),
             end = load(rays.last.data() + lanes);
-  const Row water = splat(line.water), none = splat(0.0f);
+  const Row none = splat(0.0f);
   Row sum = load(sums + lane);
   for (int k = first; k <= last; ++k) {
     const Row at = splat(static_cast<float>(k));
@@ -109,21 +115,19 @@ void ray_rows(const HuLattice& lattice, const PlaneStrides& s, int first, int la
                 c = lower_of(pairs(plane, place + s.u)), d = lower_of(pairs(plane, place + (s.u + s.v)));
       value = mixed(mixed(a, b, cv.weight), mixed(c, d, cv.weight), cu.weight);
     }
-    value = value + line.extra * high(value - water, none);
     sum = sum + ((at >= begin) & (at <= end) ? value : none);
   }
   store(sums + lane, sum);
 }
 
-void plane_rows(const HuLattice& lattice, int axis, int first, int last, const RayPacket& rays,
-                const AttenuationLine& line, float* sums) {
+void plane_rows(const HuLattice& lattice, int axis, int first, int last, const RayPacket& rays, float* sums) {
   const std::int32_t nz = lattice.dims.z, plane = lattice.dims.y * nz;
   for (int lane = 0; lane < kRays; lane += kLanes) {
     if (axis == 0)
-      ray_rows<true>(lattice, {plane, nz, 1, lattice.dims.y, nz}, first, last, rays, lane, line, sums);
+      ray_rows<true>(lattice, {plane, nz, 1, lattice.dims.y, nz}, first, last, rays, lane, sums);
     else if (axis == 1)
-      ray_rows<true>(lattice, {nz, plane, 1, lattice.dims.x, nz}, first, last, rays, lane, line, sums);
+      ray_rows<true>(lattice, {nz, plane, 1, lattice.dims.x, nz}, first, last, rays, lane, sums);
     else
-      ray_rows<false>(lattice, {1, plane, nz, lattice.dims.x, lattice.dims.y}, first, last, rays, lane, line, sums);
+      ray_rows<false>(lattice, {1, plane, nz, lattice.dims.x, lattice.dims.y}, first, last, rays, lane, sums);
   }
 }
