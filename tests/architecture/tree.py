@@ -11,6 +11,7 @@ LAYERS = {
     "volume": {"core", "geometry", "tools", "field"},
     "imaging": {"core", "geometry", "tools", "field", "volume"},
     "phantoms": {"core", "geometry", "tools", "field", "volume"},
+    "radiology": {"core", "geometry", "tools", "field", "volume"},
     "surface": {"core", "geometry", "tools", "field"},
     "mechanics": {"core", "geometry", "tools", "field"},
     "picture": {"core"},

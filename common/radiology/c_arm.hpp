@@ -1,0 +1,40 @@
+// A C-arm: an X-ray tube and a detector on an arc, turned about the patient, and the cone beam between them.
+#pragma once
+#include <optional>
+
+#include "common/geometry/lattice.hpp"
+#include "common/radiology/pixel_grid.hpp"
+
+namespace osteon::radiology {
+
+// Rays from a point to each pixel of a flat detector.
+struct ConeBeam {
+  Vec3 source_mm = Vec3::Zero();  // focal spot, in the bone's frame
+  PixelGrid detector;
+};
+
+// The pixels that the rays through a box may reach. All pixels if the box is not wholly in front of the source. May be
+// empty.
+[[nodiscard]] PixelBox shadow_of(const Box& box, const ConeBeam& beam);
+
+// [A] Dimensions of a usual mobile C-arm with a detector of 30 cm.
+struct CArm {
+  Vec3 isocentre_mm = Vec3::Zero();  // what both rotations are about, in the bone's frame (LPS)
+  // About the patient's long axis. At 0 the tube is under the table, behind the patient, and the detector in front of
+  // the patient. Positive angles move the detector to the patient's left.
+  double orbit_rad = 0.0;
+  double tilt_rad = 0.0;  // moves the detector towards the head
+  Vec3 translation_mm = Vec3::Zero();
+  double source_detector_mm = 1000.0;
+  double source_isocentre_mm = 600.0;
+  double detector_mm = 300.0;  // width; the height follows from the pixels, which are square
+  int columns = 800, rows = 600;
+};
+
+// Three usual positions about an isocentre. In all of them the image is as from the detector towards the tube.
+enum class View { anteroposterior, lateral, axial };
+[[nodiscard]] CArm c_arm_at(View view, const Vec3& isocentre_mm);
+
+[[nodiscard]] ConeBeam beam_of(const CArm& arm);
+
+}  // namespace osteon::radiology

@@ -1,0 +1,48 @@
+// What an image intensifier shows of the rays that got through: photons with their noise, glare, and grey values. Each
+// is a step of its own.
+#pragma once
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "common/radiology/c_arm.hpp"
+
+namespace osteon::radiology {
+
+// [A] One pulse of a mobile C-arm in its usual setting. Air kerma is the dose of the beam to air, without a patient.
+struct Exposure {
+  double air_kerma_at_metre_ugy = 2.0;
+};
+
+// Nominal dose-area product of one pulse, Gy cm²: air kerma times area of the beam. It is the same at every distance
+// from the source. Nominal, because it follows from the setting alone.
+[[nodiscard]] double dose_area_gy_cm2(const ConeBeam& beam, const Exposure& exposure);
+
+// [A] All three.
+struct Intensifier {
+  double detected = 0.65;       // part of the photons that counts: the detective quantum efficiency
+  double glare = 0.1;           // part of the light that spreads over the whole image
+  double glare_radius_mm = 40;  // on the detector: half the side of the square over which it spreads
+};
+
+// Mean number of photons that each pixel counts: the kerma without a patient at the pixel, by the inverse square of the
+// distance and the cosine of incidence, times exp(−attenuation).
+[[nodiscard]] std::vector<float> photons_at(const ConeBeam& beam, std::span<const float> attenuation,
+                                            const Exposure& exposure, const Intensifier& intensifier);
+// Replaces each mean by a number of photons at random (Poisson). Equal seeds give equal noise, and the noise of a pixel
+// does not depend on the other pixels.
+void add_quantum_noise(std::span<float> photons, std::uint64_t seed);
+// Spreads a part of the light: veiling glare. The sum of all pixels stays, but for what leaves the image.
+void add_glare(const PixelGrid& detector, const Intensifier& intensifier, std::span<float> photons);
+
+// Photons that become black and white. Between them, grey follows the logarithm, so that equal thicknesses differ
+// equally.
+struct Contrast {
+  float black = 1.0f, white = 1000.0f;
+  bool inverted = false;  // dense matter is white, as on film
+};
+// As automatic brightness control sets it: the darkest and the brightest hundredth of the image are black and white.
+[[nodiscard]] Contrast automatic_contrast(std::span<const float> photons);
+[[nodiscard]] std::vector<std::uint8_t> grey_of(std::span<const float> photons, const Contrast& contrast);
+
+}  // namespace osteon::radiology

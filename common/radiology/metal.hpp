@@ -1,0 +1,25 @@
+// The shadow of metal: of tools, screws and implants.
+#pragma once
+#include <span>
+
+#include "common/radiology/c_arm.hpp"
+#include "common/tools/implicit.hpp"
+
+namespace osteon::radiology {
+
+struct MetalSolid {
+  Implicit solid;  // in the bone's frame, as placed() makes it; negative inside and 1-Lipschitz
+  double attenuation_per_mm = 0.0;
+};
+
+// Lengths in metal are exact to this, for each face that a ray crosses.
+inline constexpr double kMetalStep_mm = 0.02;
+
+// Length of the part of a ray that lies in the solid, mm. The distance to the surface bounds each step, so no surface
+// is stepped over.
+[[nodiscard]] double length_in(const Implicit& solid, const Vec3& from_mm, const Vec3& to_mm);
+
+// Adds what the solids weaken each ray, ∫ μ dl. They displace no bone: a screw's hole is a cut.
+void add_metal(const ConeBeam& beam, std::span<const MetalSolid> solids, std::span<float> attenuation);
+
+}  // namespace osteon::radiology

@@ -1,0 +1,227 @@
+// HU of the bone as it is: the field's own samples before any cut, air where bone was cut away, and nothing else.
+#include "common/radiology/bone_hu.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <numbers>
+
+#include "tests/support/scenes/random_cuts.hpp"
+
+namespace osteon::radiology {
+namespace {
+
+std::vector<const CutField*> only(const CutField& field) { return {&field}; }
+
+CoordBox around(const BoneHu& bone) { return bone.box().grown(2); }
+
+template <class Call>
+void each_sample(const CoordBox& box, Call call) {
+  for (std::int32_t x = box.min.x; x <= box.max.x; ++x)
+    for (std::int32_t y = box.min.y; y <= box.max.y; ++y)
+      for (std::int32_t z = box.min.z; z <= box.max.z; ++z) call(Coord{x, y, z});
+}
+
+std::vector<float> all_hu(const BoneHu& bone) {
+  std::vector<float> values;
+  each_sample(around(bone), [&](Coord c) { values.push_back(bone.hu(c)); });
+  return values;
+}
+
+float value_at(const std::function<void(const CoordBox&, std::span<float>)>& gather, Coord c) {
+  float value = 0.0f;
+  gather({c, c}, {&value, 1});
+  return value;
+}
+float surface_at(const Case& bone, Coord c) {
+  return value_at([&](const CoordBox& box, std::span<float> out) { bone.gather_surface(box, out); }, c);
+}
+
+ChangedLeaves changes_of(const CutReport& report) { return {report.level, report.changed_leaves}; }
+
+// A round hole into the middle of a block's top.
+Cut hole(double depth_mm = 6.0) {
+  return test::straight_cut(*find_tool("burr-round-5"), {0, 0, 2}, {0, 0, -depth_mm}, {0, 0, -1});
+}
+
+// A block with soft tissue of 40 HU about it, on voxels that are not those of the bone.
+struct ScannedBlock {
+  Case bone = test::plain_block(16.0, 12.0, 0.5);
+  CaseScan scan;
+  ScannedBlock() {
+    scan.geometry = {{40, 40, 30}, Vec3(-12.1, -12.2, -15.3), Vec3(0.62, 0.62, 0.7).asDiagonal()};
+    for (int k = 0; k < 30; ++k)
+      for (int j = 0; j < 40; ++j)
+        for (int i = 0; i < 40; ++i)
+          scan.hu.push_back(bone.surface_mm(scan.geometry.position_mm(Vec3(i, j, k))) < 0.0 ? 1600 : 40);
+  }
+};
+
+TEST(BoneHu, IsTheDensityOfEachSample) {
+  const Case bone = test::make_bone(
+      {Vec3(-6, -6, -6), Vec3(6, 6, 6)}, 0.5, [](const Vec3& p) { return p.norm() - 6.0; },
+      [](const Vec3& p) { return 1.0 + 0.05 * p.x(); });
+  const auto hu = BoneHu::make(bone);
+  ASSERT_TRUE(hu.has_value());
+  std::size_t deep = 0;
+  each_sample(around(*hu), [&](Coord c) {
+    const float s = surface_at(bone, c);
+    if (s >= 0.25f) {
+      EXPECT_EQ(hu->hu(c), -1000.0f);
+    } else if (s <= -0.25f) {
+      const double expected = (1.0 + 0.05 * 0.5 * c.x - 0.131) / 0.001067;
+      EXPECT_NEAR(static_cast<double>(hu->hu(c)), expected, 0.126);
+      ++deep;
+    } else {
+      EXPECT_GE(hu->hu(c), -1000.0f);
+    }
+  });
+  EXPECT_GT(deep, 5000U);
+}
+
+// The attenuation of a whole ball converges to that of its volume, because its skin is partly bone.
+TEST(BoneHu, HoldsTheMassOfABall) {
+  const auto mass = [](double pitch) {
+    const Case bone = test::make_bone(
+        {Vec3(-6, -6, -6), Vec3(6, 6, 6)}, pitch, [](const Vec3& p) { return p.norm() - 6.0; },
+        [](const Vec3&) { return 1.2; });
+    const auto hu = BoneHu::make(bone);
+    double sum = 0.0;
+    each_sample(hu->box(), [&](Coord c) { sum += hu->attenuation_per_mm(c); });
+    return sum * pitch * pitch * pitch;
+  };
+  const double exact = attenuation_per_mm((1.2 - 0.131) / 0.001067) * 4.0 / 3.0 * std::numbers::pi * 216.0;
+  EXPECT_NEAR(mass(0.5), exact, 0.004 * exact);
+  EXPECT_NEAR(mass(0.25), exact, 0.001 * exact);
+}
+
+TEST(BoneHu, IsTheScanWhereTheCaseHasOne) {
+  // Linear in space, so that trilinear samples are exact.
+  const auto linear = [](const Vec3& p) { return std::round(300.0 + 20.0 * p.x() - 10.0 * p.y() + 5.0 * p.z()); };
+  const Case bone = test::plain_block(8.0, 6.0, 0.5);
+  CaseScan scan;
+  Eigen::Matrix3d axes = Vec3(0.5, 0.5, 1.0).asDiagonal();
+  axes = Eigen::AngleAxisd(0.5 * std::numbers::pi, Vec3::UnitZ()).toRotationMatrix() * axes;
+  scan.geometry = {{30, 28, 12}, Vec3(7.0, -7.5, -8.0), axes};
+  for (int k = 0; k < 12; ++k)
+    for (int j = 0; j < 28; ++j)
+      for (int i = 0; i < 30; ++i)
+        scan.hu.push_back(static_cast<std::int16_t>(linear(scan.geometry.position_mm(Vec3(i, j, k)))));
+  const auto hu = BoneHu::make(bone, &scan);
+  ASSERT_TRUE(hu.has_value());
+  for (const Coord c : {Coord{0, 0, 0}, Coord{3, -5, -7}, Coord{-10, 4, 2}})
+    EXPECT_NEAR(static_cast<double>(hu->hu(c)), linear(position_mm(c, 0.5)), 1.2);  // both are rounded
+  // Beyond the scan.
+  EXPECT_EQ(hu->hu({0, 0, 20}), -1000.0f);
+}
+
+TEST(BoneHu, CutsReadAirOnlyWhereBoneWas) {
+  ScannedBlock scene;
+  auto hu = BoneHu::make(scene.bone, &scene.scan);
+  ASSERT_TRUE(hu.has_value());
+  const std::vector<float> before = all_hu(*hu);
+  CutField field(scene.bone, {});
+  field.apply(hole());
+  hu->renew(only(field));
+  std::size_t i = 0, removed = 0, spared = 0;
+  each_sample(around(*hu), [&](Coord c) {
+    const float was = before[i++], now = hu->hu(c), s = surface_at(scene.bone, c);
+    const bool swept = (position_mm(c, 0.5) - Vec3(0, 0, -3.5)).norm() < 1.8;
+    if (s > 0.5f) {
+      EXPECT_EQ(now, was) << "beside the bone";
+      spared += std::hypot(0.5 * c.x, 0.5 * c.y) < 2.0 && c.z > 1 && c.z < 4 ? 1 : 0;
+    } else if (s < -0.5f && swept) {
+      EXPECT_EQ(now, -1000.0f);
+      ++removed;
+    }
+    EXPECT_LE(now, was);
+  });
+  EXPECT_GT(removed, 100U);
+  EXPECT_GT(spared, 50U);  // soft tissue that the bur swept
+}
+
+// What the samples lost is what the field lost.
+TEST(BoneHu, LosesTheVolumeThatWasRemoved) {
+  const Case bone = test::plain_block(16.0, 12.0, 0.5);
+  auto hu = BoneHu::make(bone);
+  ASSERT_TRUE(hu.has_value());
+  const auto whole = [&] {
+    double sum = 0.0;
+    each_sample(hu->box(), [&](Coord c) { sum += hu->attenuation_per_mm(c); });
+    return sum * 0.125;
+  };
+  const double before = whole();
+  CutField field(bone, {});
+  const CutReport report = field.apply(hole());
+  hu->update(only(field), std::vector{changes_of(report)});
+  const double removed_mm3 = (before - whole()) / attenuation_per_mm((1.9 - 0.131) / 0.001067);
+  EXPECT_GT(removed_mm3, 50.0);
+  EXPECT_NEAR(removed_mm3, field.removed_mm3(), 0.01 * field.removed_mm3());
+}
+
+TEST(BoneHu, AnUpdateEqualsARenewal) {
+  const Case bone = test::ball_of_bone();
+  auto updated = BoneHu::make(bone), renewed = BoneHu::make(bone);
+  ASSERT_TRUE(updated.has_value() && renewed.has_value());
+  CutField field(bone, {});
+  test::Random random(7);
+  std::size_t changed_cuts = 0;
+  for (const Cut& cut : test::grazing_cuts(60, random)) {
+    const std::vector<float> before = all_hu(*updated);
+    const CutReport report = field.apply(cut);
+    const std::vector<CoordBox> boxes = updated->update(only(field), std::vector{changes_of(report)});
+    changed_cuts += boxes.empty() ? 0 : 1;
+    // Every sample that changed is in one of the boxes.
+    std::size_t i = 0;
+    each_sample(around(*updated), [&](Coord c) {
+      if (updated->hu(c) == before[i++]) return;
+      EXPECT_TRUE(std::ranges::any_of(boxes, [&](const CoordBox& box) { return box.contains(c); }));
+    });
+  }
+  EXPECT_GT(changed_cuts, 20U);
+  renewed->renew(only(field));
+  EXPECT_EQ(all_hu(*updated), all_hu(*renewed));
+  // Everything comes back when all cuts are undone.
+  std::vector<ChangedLeaves> undone;
+  for (const FieldLeaf& leaf : field.leaf_places()) {
+    field.reset(leaf.level, leaf.origin);
+    undone.push_back({leaf.level, {leaf.origin}});
+  }
+  updated->update(only(field), undone);
+  EXPECT_EQ(all_hu(*updated), all_hu(*BoneHu::make(bone)));
+}
+
+// A brick is marked exactly when one of its 9³ samples is not air.
+TEST(BoneHu, KnowsWhichBricksAreEmpty) {
+  const Case bone = test::ball_of_bone();
+  auto hu = BoneHu::make(bone);
+  ASSERT_TRUE(hu.has_value());
+  CutField field(bone, {});
+  const Cut deep = test::straight_cut(*find_tool("burr-round-5"), {0, 0, 12}, {0, 0, -12}, {0, 0, -1});
+  hu->update(only(field), std::vector{changes_of(field.apply(deep))});
+  const HuLattice lattice = hu->lattice();
+  std::size_t i = 0, empty = 0;
+  for (std::int32_t x = 0; x < lattice.bricks.x; ++x)
+    for (std::int32_t y = 0; y < lattice.bricks.y; ++y)
+      for (std::int32_t z = 0; z < lattice.bricks.z; ++z, ++i) {
+        const Coord first = hu->box().min + 8 * Coord{x, y, z} - Coord{1, 1, 1};
+        bool any = false;
+        each_sample({first, first + Coord{8, 8, 8}}, [&](Coord c) { any |= hu->hu(c) > -1000.0f; });
+        EXPECT_EQ(lattice.occupied[i] != 0, any);
+        empty += any ? 0 : 1;
+      }
+  EXPECT_GT(empty, 0U);
+}
+
+TEST(BoneHu, RefusesAScanWithoutHu) {
+  CaseScan scan;
+  scan.geometry.dims = {4, 4, 4};
+  const auto made = BoneHu::make(test::plain_block(8.0, 6.0, 0.5), &scan);
+  ASSERT_FALSE(made.has_value());
+  EXPECT_EQ(made.error().code, ErrorCode::invalid_input);
+}
+
+}  // namespace
+}  // namespace osteon::radiology

@@ -1,0 +1,143 @@
+// Metal, photons, noise, glare and grey: closed forms and statistics.
+#include "common/radiology/intensifier.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numeric>
+
+#include "common/radiology/attenuation.hpp"
+#include "common/radiology/metal.hpp"
+#include "common/tools/tool_solid.hpp"
+
+namespace osteon::radiology {
+namespace {
+
+ConeBeam coarse_beam() {
+  CArm arm;
+  arm.detector_mm = 120.0;
+  arm.columns = 120;
+  arm.rows = 90;
+  return beam_of(arm);
+}
+
+double mean_of(std::span<const float> values) {
+  return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
+}
+
+TEST(Attenuation, IsThatOfItsMaterials) {
+  EXPECT_EQ(attenuation_per_mm(-1000.0), 0.0);
+  EXPECT_DOUBLE_EQ(attenuation_per_mm(0.0), kWater_per_mm);
+  EXPECT_NEAR(attenuation_per_mm(kCorticalBone_hu), kCorticalBone_per_mm, 1e-12);
+  EXPECT_DOUBLE_EQ(attenuation_per_mm(-500.0), 0.5 * kWater_per_mm);
+  // The definition of HU with the coefficients at 70 keV.
+  EXPECT_NEAR(kCorticalBone_hu, 1000.0 * (1.92 * 0.2616 / 0.1937 - 1.0), 1.0);
+}
+
+TEST(Metal, LengthsAreThoseOfTheSolid) {
+  const Implicit shaft = placed(cylinder(2.0, -30.0, 30.0), pose_along(Vec3(1, 2, 3), Vec3(0, 0, 1)));
+  EXPECT_NEAR(length_in(shaft, Vec3(1, -300, 3), Vec3(1, 300, 3)), 4.0, 2.0 * kMetalStep_mm);
+  EXPECT_NEAR(length_in(shaft, Vec3(2, -300, 3), Vec3(2, 300, 3)), 2.0 * std::sqrt(3.0), 2.0 * kMetalStep_mm);
+  EXPECT_NEAR(length_in(shaft, Vec3(1, 2, -300), Vec3(1, 2, 300)), 60.0, 2.0 * kMetalStep_mm);
+  EXPECT_EQ(length_in(shaft, Vec3(4, -300, 3), Vec3(4, 300, 3)), 0.0);
+  // A ray that ends in the solid.
+  EXPECT_NEAR(length_in(shaft, Vec3(1, -300, 3), Vec3(1, 2, 3)), 2.0, 2.0 * kMetalStep_mm);
+}
+
+TEST(Metal, DarkensOnlyItsShadow) {
+  const ConeBeam beam = coarse_beam();
+  std::vector<float> attenuation(beam.detector.count(), 1.0f);
+  const MetalSolid nail{ball(Vec3(0, 0, 0), 6.0), kSteel_per_mm};
+  add_metal(beam, {&nail, 1}, attenuation);
+  double most = 0.0;
+  for (int row = 0; row < 90; ++row)
+    for (int column = 0; column < 120; ++column) {
+      const Vec3 pixel = beam.detector.at(column, row), d = (pixel - beam.source_mm).normalized();
+      const double nearest = (-beam.source_mm - d * d.dot(-beam.source_mm)).norm();
+      const double length = nearest < 6.0 ? 2.0 * std::sqrt(36.0 - nearest * nearest) : 0.0;
+      const double found = static_cast<double>(attenuation[beam.detector.index(column, row)]) - 1.0;
+      ASSERT_NEAR(found, kSteel_per_mm * length, 3.0 * kMetalStep_mm * kSteel_per_mm);
+      most = std::max(most, found);
+    }
+  EXPECT_GT(most, 18.0);
+}
+
+TEST(Intensifier, PhotonsFollowTheLawOfBeerAndLambert) {
+  const ConeBeam beam = coarse_beam();
+  const std::vector<float> none(beam.detector.count(), 0.0f), one(beam.detector.count(), 1.0f);
+  const std::vector<float> open = photons_at(beam, none, {}, {}), dimmed = photons_at(beam, one, {}, {});
+  for (std::size_t i = 0; i < open.size(); ++i) ASSERT_NEAR(dimmed[i] / open[i], std::exp(-1.0f), 1e-6f);
+  // At twice the distance, a quarter of the photons.
+  CArm far;
+  far.detector_mm = 120.0;
+  far.columns = 120;
+  far.rows = 90;
+  far.source_detector_mm = 2000.0;
+  const float middle = open[beam.detector.index(60, 45)];
+  EXPECT_NEAR(photons_at(beam_of(far), none, {}, {})[beam.detector.index(60, 45)] / middle, 0.25f, 1e-3f);
+}
+
+TEST(Intensifier, DoseAreaDoesNotDependOnTheDistance) {
+  CArm arm;
+  arm.columns = 100;
+  arm.rows = 100;
+  arm.detector_mm = 100.0;
+  // 2 µGy at 1 m on 100 cm².
+  EXPECT_NEAR(dose_area_gy_cm2(beam_of(arm), {2.0}), 2e-4, 1e-12);
+  arm.source_detector_mm = 500.0;
+  arm.detector_mm = 50.0;  // the same cone
+  EXPECT_NEAR(dose_area_gy_cm2(beam_of(arm), {2.0}), 2e-4, 1e-12);
+}
+
+// Mean and variance of a Poisson distribution are equal. Bounds: four standard errors.
+TEST(Intensifier, NoiseIsPoisson) {
+  constexpr std::size_t kPixels = 40000;
+  for (const double mean : {0.3, 4.0, 59.0, 61.0, 5000.0}) {
+    std::vector<float> photons(kPixels, static_cast<float>(mean));
+    add_quantum_noise(photons, 1234);
+    double squares = 0.0;
+    const double found = mean_of(photons);
+    for (const float n : photons) squares += (static_cast<double>(n) - found) * (static_cast<double>(n) - found);
+    EXPECT_NEAR(found, mean, 4.0 * std::sqrt(mean / kPixels));
+    EXPECT_NEAR(squares / kPixels, mean, 4.0 * std::sqrt((2.0 * mean * mean + mean) / kPixels));
+  }
+}
+
+TEST(Intensifier, NoiseRepeatsWithItsSeed) {
+  std::vector<float> a(500, 80.0f), b(500, 80.0f), other(500, 80.0f), longer(700, 80.0f);
+  add_quantum_noise(a, 1);
+  add_quantum_noise(b, 1);
+  add_quantum_noise(other, 2);
+  add_quantum_noise(longer, 1);
+  EXPECT_EQ(a, b);
+  EXPECT_NE(a, other);
+  EXPECT_TRUE(std::equal(a.begin(), a.end(), longer.begin()));
+}
+
+TEST(Intensifier, GlareKeepsTheLight) {
+  const PixelGrid detector = grid_about(Vec3::Zero(), Vec3::UnitX(), Vec3::UnitY(), 1.0, 201, 201);
+  std::vector<float> photons(detector.count(), 0.0f);
+  photons[detector.index(100, 100)] = 81.0f * 81.0f;
+  add_glare(detector, {.detected = 1.0, .glare = 0.1, .glare_radius_mm = 40.0}, photons);
+  EXPECT_NEAR(mean_of(photons) * static_cast<double>(photons.size()), 81.0 * 81.0, 0.1);
+  EXPECT_NEAR(photons[detector.index(100 + 40, 100 - 40)], 0.1f, 1e-5f);
+  EXPECT_EQ(photons[detector.index(100 + 41, 100)], 0.0f);
+  EXPECT_NEAR(photons[detector.index(100, 100)], 0.9f * 81.0f * 81.0f + 0.1f, 0.01f);
+}
+
+TEST(Intensifier, GreyFollowsTheLogarithm) {
+  const std::vector<float> photons{1.0f, 10.0f, 100.0f, 1000.0f, 10000.0f, 100000.0f};
+  EXPECT_EQ(grey_of(photons, {10.0f, 10000.0f, false}), (std::vector<std::uint8_t>{0, 0, 85, 170, 255, 255}));
+  EXPECT_EQ(grey_of(photons, {10.0f, 10000.0f, true}), (std::vector<std::uint8_t>{255, 255, 170, 85, 0, 0}));
+  std::vector<float> ramp(1000);
+  std::iota(ramp.begin(), ramp.end(), 1.0f);
+  const Contrast contrast = automatic_contrast(ramp);
+  EXPECT_EQ(contrast.black, 11.0f);
+  EXPECT_EQ(contrast.white, 990.0f);
+  // An image of one value, such as air.
+  EXPECT_GT(automatic_contrast(std::vector<float>(9, 5.0f)).white,
+            automatic_contrast(std::vector<float>(9, 5.0f)).black);
+}
+
+}  // namespace
+}  // namespace osteon::radiology

@@ -1,0 +1,284 @@
+// Radiographs: closed forms under the cone, convergence, symmetry, conservation, and that rays cast again after a cut
+// give the same image as all rays.
+#include "common/radiology/radiograph.hpp"
+
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <functional>
+#include <numbers>
+
+#include "common/radiology/attenuation.hpp"
+#include "common/radiology/sampling.hpp"
+#include "common/tools/implicit.hpp"
+#include "tests/support/scenes/random_cuts.hpp"
+
+namespace osteon::radiology {
+namespace {
+
+using Distance = std::function<double(const Vec3&)>;
+
+constexpr double kDensity_g_cm3 = 1.2;
+double bone_per_mm(double density_g_cm3 = kDensity_g_cm3) {
+  return attenuation_per_mm((density_g_cm3 - kDefaultLine.intercept_g_cm3) / kDefaultLine.slope_g_cm3_per_hu);
+}
+
+Case solid_bone(const Box& extent, double pitch_mm, const Distance& distance, double density = kDensity_g_cm3) {
+  return test::make_bone(extent, pitch_mm, distance, [=](const Vec3&) { return density; });
+}
+
+BoneHu hu_of(const Case& bone) {
+  auto made = BoneHu::make(bone);
+  EXPECT_TRUE(made.has_value());
+  return std::move(*made);
+}
+
+Radiograph image_of(const BoneHu& bone, const ConeBeam& beam) {
+  Radiograph image(beam);
+  image.cast(bone);
+  return image;
+}
+
+// A beam of few pixels, turned away from the axes of the lattice.
+ConeBeam small_beam(double orbit_rad = 0.3, double tilt_rad = 0.2) {
+  CArm arm;
+  arm.orbit_rad = orbit_rad;
+  arm.tilt_rad = tilt_rad;
+  arm.detector_mm = 80.0;
+  arm.columns = 96;
+  arm.rows = 72;
+  return beam_of(arm);
+}
+
+// Length of a line in a solid that is the part of space between the two roots of a quadratic in the line's position.
+double chord(double a, double b, double c) {
+  const double under = b * b - 4.0 * a * c;
+  return a > 0.0 && under > 0.0 ? std::sqrt(under) / a : 0.0;
+}
+
+double length_in_ball(const ConeBeam& beam, const Vec3& pixel, double radius) {
+  const Vec3 d = (pixel - beam.source_mm).normalized(), s = beam.source_mm;
+  return chord(1.0, 2.0 * d.dot(s), s.squaredNorm() - radius * radius);
+}
+
+// About the z axis, long enough that no ray leaves at its ends.
+double length_in_tube(const ConeBeam& beam, const Vec3& pixel, double outer, double inner) {
+  const Vec3 d = (pixel - beam.source_mm).normalized(), s = beam.source_mm;
+  const double a = d.head<2>().squaredNorm(), b = 2.0 * d.head<2>().dot(s.head<2>()), c = s.head<2>().squaredNorm();
+  return chord(a, b, c - outer * outer) - chord(a, b, c - inner * inner);
+}
+
+// Of half-spaces n · p <= offset.
+double length_in_wedge(const ConeBeam& beam, const Vec3& pixel, const std::vector<HalfSpace>& faces) {
+  const Vec3 d = (pixel - beam.source_mm).normalized();
+  double first = 0.0, last = 1e9;
+  for (const HalfSpace& face : faces) {
+    const double along = face.normal.dot(d), left = face.offset_mm - face.normal.dot(beam.source_mm);
+    if (along > 0.0) last = std::min(last, left / along);
+    if (along < 0.0) first = std::max(first, left / along);
+    if (along == 0.0 && left < 0.0) return 0.0;
+  }
+  return std::max(0.0, last - first);
+}
+
+struct Errors {
+  double rms = 0.0, worst = 0.0;  // of the range
+};
+
+// Of the attenuation against the length in closed form.
+Errors errors(const Radiograph& image, const std::function<double(const Vec3&)>& length_mm) {
+  const PixelGrid& grid = image.beam().detector;
+  double range = 0.0, squares = 0.0, worst = 0.0;
+  for (int row = 0; row < grid.rows; ++row)
+    for (int column = 0; column < grid.columns; ++column) {
+      const double exact = bone_per_mm() * length_mm(grid.at(column, row));
+      const double error = static_cast<double>(image.attenuation()[grid.index(column, row)]) - exact;
+      range = std::max(range, exact);
+      squares += error * error;
+      worst = std::max(worst, std::abs(error));
+    }
+  EXPECT_GT(range, 0.1);
+  return {std::sqrt(squares / static_cast<double>(grid.count())) / range, worst / range};
+}
+
+// One percent of the range as root mean square at the pitch of a CT, and the error falls with the pitch. At the rim of
+// a shadow, a length changes by a root of the distance from it, so single pixels there are farther off.
+void expect_closed_form(const Box& extent, const Distance& distance,
+                        const std::function<double(const ConeBeam&, const Vec3&)>& length_mm, double least_order) {
+  const ConeBeam beam = small_beam();
+  Errors found[2];
+  for (const int finer : {0, 1}) {
+    const BoneHu bone = hu_of(solid_bone(extent, finer ? 0.25 : 0.5, distance));
+    found[finer] = errors(image_of(bone, beam), [&](const Vec3& pixel) { return length_mm(beam, pixel); });
+  }
+  EXPECT_LT(found[0].rms, 0.01);
+  EXPECT_LT(found[1].rms, found[0].rms / least_order);
+  std::printf("[ error    ] of the range: rms %.3f %%, worst %.3f %%; at half the pitch %.3f %%, %.3f %%\n",
+              100.0 * found[0].rms, 100.0 * found[0].worst, 100.0 * found[1].rms, 100.0 * found[1].worst);
+}
+
+TEST(Radiograph, OfABall) {
+  expect_closed_form(
+      {Vec3(-12, -12, -12), Vec3(12, 12, 12)}, [](const Vec3& p) { return p.norm() - 12.0; },
+      [](const ConeBeam& beam, const Vec3& pixel) { return length_in_ball(beam, pixel, 12.0); }, 1.5);
+}
+
+TEST(Radiograph, OfATube) {
+  expect_closed_form(
+      {Vec3(-11, -11, -45), Vec3(11, 11, 45)},
+      [](const Vec3& p) {
+        const double r = std::hypot(p.x(), p.y());
+        return std::max({r - 11.0, 6.0 - r, std::abs(p.z()) - 45.0});
+      },
+      [](const ConeBeam& beam, const Vec3& pixel) { return length_in_tube(beam, pixel, 11.0, 6.0); }, 1.5);
+}
+
+TEST(Radiograph, OfAWedge) {
+  const std::vector<HalfSpace> faces{{Vec3(-1, 0, 0), 12.0},
+                                     {Vec3(0, -1, 0), 2.0},
+                                     {Vec3(1, 2, 0).normalized(), 12.0},
+                                     {Vec3(0, 0, 1), 13.3},
+                                     {Vec3(0, 0, -1), 13.3}};
+  const Implicit solid = convex(faces);
+  expect_closed_form(
+      solid.bounds, solid.distance_mm,
+      [&](const ConeBeam& beam, const Vec3& pixel) { return length_in_wedge(beam, pixel, faces); }, 1.5);
+}
+
+// Along a ray through the middle of a ball, every view gives the same.
+TEST(Radiograph, OfABallIsTheSameFromEverywhere) {
+  const BoneHu bone =
+      hu_of(solid_bone({Vec3(-8, -8, -8), Vec3(8, 8, 8)}, 0.5, [](const Vec3& p) { return p.norm() - 8.0; }));
+  test::Random random(3);
+  for (int i = 0; i < 40; ++i) {
+    ConeBeam beam;
+    const Vec3 axis = random.direction();
+    beam.source_mm = -500.0 * axis;
+    beam.detector = {200.0 * axis, pose_along(Vec3::Zero(), axis).direction(Vec3::UnitX()),
+                     pose_along(Vec3::Zero(), axis).direction(Vec3::UnitY()), 1, 1};
+    EXPECT_NEAR(static_cast<double>(image_of(bone, beam).attenuation()[0]), 16.0 * bone_per_mm(),
+                0.01 * 16.0 * bone_per_mm());
+  }
+}
+
+TEST(Radiograph, OfAMirroredBoneIsMirrored) {
+  const auto blob = [](const Vec3& p) {
+    return std::min((p - Vec3(5, 1, 2)).norm() - 6.0, (p - Vec3(-4, -2, -1)).norm() - 8.0);
+  };
+  const Box extent{Vec3(-13, -13, -13), Vec3(13, 13, 13)};
+  const BoneHu bone = hu_of(solid_bone(extent, 0.5, blob));
+  const BoneHu mirrored =
+      hu_of(solid_bone(extent, 0.5, [&](const Vec3& p) { return blob(Vec3(-p.x(), p.y(), p.z())); }));
+  const ConeBeam beam = small_beam(0.0, 0.25);  // in the plane of the mirror
+  const Radiograph a = image_of(bone, beam), b = image_of(mirrored, beam);
+  const PixelGrid& grid = beam.detector;
+  for (int row = 0; row < grid.rows; ++row)
+    for (int column = 0; column < grid.columns; ++column)
+      ASSERT_NEAR(static_cast<double>(a.attenuation()[grid.index(column, row)]),
+                  static_cast<double>(b.attenuation()[grid.index(grid.columns - 1 - column, row)]), 1e-4);
+}
+
+// Two densities whose attenuations are as one to two.
+TEST(Radiograph, ScalesWithTheAttenuation) {
+  const auto ball = [](const Vec3& p) { return p.norm() - 9.0; };
+  const Box extent{Vec3(-9, -9, -9), Vec3(9, 9, 9)};
+  const double once = 0.5, at_once = bone_per_mm(once);
+  const double hu = (2.0 * at_once - kWater_per_mm) / (kCorticalBone_per_mm - kWater_per_mm) * kCorticalBone_hu;
+  const double twice = kDefaultLine.intercept_g_cm3 + kDefaultLine.slope_g_cm3_per_hu * hu;
+  ASSERT_NEAR(bone_per_mm(twice), 2.0 * at_once, 1e-9);
+  const ConeBeam beam = small_beam();
+  const auto inner = [&](double density) {
+    const BoneHu bone = hu_of(solid_bone(extent, 0.5, ball, density));
+    return static_cast<double>(image_of(bone, beam).attenuation()[beam.detector.index(47, 35)]);
+  };
+  EXPECT_NEAR(inner(twice), 2.0 * inner(once), 0.002 * inner(twice));
+}
+
+// From far away rays are parallel: the sum of all pixels is the sum of all voxels, however the bone lies.
+TEST(Radiograph, HoldsTheWholeBone) {
+  const Case ball = solid_bone({Vec3(-6, -6, -6), Vec3(6, 6, 6)}, 0.5, [](const Vec3& p) { return p.norm() - 6.0; });
+  const BoneHu bone = hu_of(ball);
+  double voxels = 0.0;
+  const CoordBox& box = bone.box();
+  for (std::int32_t x = box.min.x; x <= box.max.x; ++x)
+    for (std::int32_t y = box.min.y; y <= box.max.y; ++y)
+      for (std::int32_t z = box.min.z; z <= box.max.z; ++z) voxels += bone.attenuation_per_mm({x, y, z}) * 0.125;
+  CArm arm;
+  arm.orbit_rad = 0.4;
+  arm.tilt_rad = -0.3;
+  arm.source_isocentre_mm = 1e5;
+  arm.source_detector_mm = 1e5 + 100.0;
+  arm.detector_mm = 16.0;
+  arm.columns = arm.rows = 64;
+  const Radiograph image = image_of(bone, beam_of(arm));
+  double pixels = 0.0;
+  for (const float a : image.attenuation()) pixels += static_cast<double>(a) * 0.25 * 0.25;
+  EXPECT_NEAR(pixels, voxels, 0.003 * voxels);
+}
+
+TEST(Radiograph, RaysCastAgainEqualAllRays) {
+  CutField field(test::ball_of_bone(), {});
+  BoneHu bone = hu_of(field.bone());
+  const ConeBeam beam = small_beam(0.5, -0.4);
+  Radiograph again = image_of(bone, beam);
+  test::Random random(5);
+  std::size_t cast = 0, images = 0;
+  for (const Cut& cut : test::grazing_cuts(200, random)) {
+    const CutReport report = field.apply(cut);
+    const std::vector<CoordBox> changed = bone.update(std::vector<const CutField*>{&field},
+                                                      std::vector{ChangedLeaves{report.level, report.changed_leaves}});
+    for (const PixelBox& box : again.recast(bone, changed))
+      cast += to_index((box.last_column - box.first_column + 1) * (box.last_row - box.first_row + 1));
+    images += changed.empty() ? 0 : 1;
+  }
+  EXPECT_GT(images, 100U);
+  EXPECT_LT(cast, images * beam.detector.count() / 2);  // far from all pixels
+  BoneHu fresh = hu_of(field.bone());
+  fresh.renew(std::vector<const CutField*>{&field});
+  EXPECT_TRUE(std::ranges::equal(again.attenuation(), image_of(fresh, beam).attenuation()));
+  EXPECT_FALSE(std::ranges::equal(again.attenuation(), image_of(hu_of(field.bone()), beam).attenuation()));
+}
+
+// The same with a beam in which the rays have different dominant axes.
+TEST(Radiograph, DoesNotDependOnThreadsNorWidths) {
+  const BoneHu bone = hu_of(solid_bone({Vec3(-12, -12, -12), Vec3(12, 12, 12)}, 0.5,
+                                       [](const Vec3& p) { return std::abs(p.norm() - 10.0) - 2.0; }));
+  CArm arm;
+  arm.orbit_rad = 0.25 * std::numbers::pi;
+  arm.tilt_rad = 0.6;
+  arm.source_isocentre_mm = 60.0;
+  arm.source_detector_mm = 100.0;
+  arm.detector_mm = 60.0;
+  arm.columns = 101;
+  arm.rows = 77;
+  const ConeBeam beam = beam_of(arm);
+  const Radiograph all = image_of(bone, beam);
+  {
+    const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
+    EXPECT_TRUE(std::ranges::equal(all.attenuation(), image_of(bone, beam).attenuation()));
+  }
+  const int widest = limit_sampling_lanes(8);
+  limit_sampling_lanes(4);
+  EXPECT_TRUE(std::ranges::equal(all.attenuation(), image_of(bone, beam).attenuation()));
+  EXPECT_EQ(limit_sampling_lanes(8), widest);
+  EXPECT_GT(*std::ranges::max_element(all.attenuation()), 0.1f);
+}
+
+// Bone behind the source or behind the detector weakens nothing.
+TEST(Radiograph, CountsOnlyWhatIsBetweenSourceAndDetector) {
+  const BoneHu bone =
+      hu_of(solid_bone({Vec3(-8, -8, -8), Vec3(8, 8, 8)}, 0.5, [](const Vec3& p) { return p.norm() - 8.0; }));
+  ConeBeam beam;
+  beam.detector = {Vec3(0, -100, 0), Vec3::UnitX(), -Vec3::UnitZ(), 1, 1};
+  beam.source_mm = Vec3(0, 0, 0);  // in the middle of the ball
+  EXPECT_NEAR(static_cast<double>(image_of(bone, beam).attenuation()[0]), 8.0 * bone_per_mm(),
+              0.03 * 16.0 * bone_per_mm());
+  beam.source_mm = Vec3(0, -20, 0);
+  EXPECT_EQ(image_of(bone, beam).attenuation()[0], 0.0f);
+}
+
+}  // namespace
+}  // namespace osteon::radiology
