@@ -24,6 +24,7 @@ using nlohmann::json;
 
 constexpr double kThickness_mm = 30.0;
 constexpr double kCone_mm = 0.961;  // height of a 118° point of 3.2 mm
+constexpr double kRigFeed_mm_per_s = 2.0;
 
 class DrillingRoom : public testing::Test {
  protected:
@@ -65,9 +66,11 @@ class DrillingRoom : public testing::Test {
 
     const std::map<std::string, double> places{{"rig", -12.0}, {"expert", 0.0}, {"novice", 12.0}};
     for (const std::string hand : {"rig", "expert", "novice"}) {
-      Process haptic = stage.start_haptic(hand, {{"steps", json::array({drill_at(places.at(hand), 0.0, hand)})}});
+      json step = drill_at(places.at(hand), 0.0, hand);
+      if (hand == "rig") step["feed_mm_per_s"] = kRigFeed_mm_per_s;
+      Process haptic = stage.start_haptic(hand, {{"steps", json::array({step})}});
       if (hand == "rig") {
-        std::this_thread::sleep_for(6s);
+        std::this_thread::sleep_for(4s);
         r.killed_were_running = doomed_viewer.process().running() && doomed_audio.running();
         doomed_viewer.process().signal(SIGKILL);
         doomed_audio.signal(SIGKILL);
@@ -170,21 +173,23 @@ TEST_F(DrillingRoom, ThreeHolesAreGoneFromTheBone) {
 
 TEST_F(DrillingRoom, TheRigFeelsChisForcesAndNothingAfterTheExit) {
   const Hole& rig = results_->holes["rig"];
-  // Chi (7.3) at 1000 rpm and 1 mm/s.
-  EXPECT_NEAR(near_cortex(rig, "force_physical_n"), 28.9, 0.05 * 28.9)
+  // Chi (7.3) at 1000 rpm, from its values at 1 mm/s.
+  const double faster = std::pow(kRigFeed_mm_per_s, 0.5189), cortex_n = 28.9 * faster, medulla_n = 3.25 * faster;
+  EXPECT_NEAR(near_cortex(rig, "force_physical_n"), cortex_n, 0.05 * cortex_n)
       << "at " << near_cortex(rig, "feed_mm_per_s") << " mm/s";
-  EXPECT_NEAR(medulla(rig, "force_physical_n"), 3.25, 0.05 * 3.25);
-  EXPECT_NEAR(far_cortex(rig, "force_physical_n"), 28.9, 0.05 * 28.9);
+  EXPECT_NEAR(medulla(rig, "force_physical_n"), medulla_n, 0.05 * medulla_n);
+  EXPECT_NEAR(far_cortex(rig, "force_physical_n"), cortex_n, 0.05 * cortex_n);
   for (const std::size_t i : on_the_way_in(rig, kThickness_mm + kCone_mm + 0.5, kThickness_mm + 2.9))
     EXPECT_LT(rig.log["force_physical_n"][i], 0.05);
-  // The rig's hand moves at 1 mm/s. The drill follows it.
+  // The drill follows the rig's hand.
   const std::vector<std::size_t> in_cortex = on_the_way_in(rig, 1.5, 4.8);
   ASSERT_GT(in_cortex.size(), 1000u);
   const auto change = [&](const std::string& column) {
     return rig.log[column][in_cortex.back()] - rig.log[column][in_cortex.front()];
   };
-  EXPECT_NEAR(change("device_depth_mm") / (1e-3 * change("state_seq")), 1.0, 0.02) << "mm/s; a tick is 1 ms";
-  EXPECT_LE(near_cortex(rig, "feed_mm_per_s"), 1.02);
+  EXPECT_NEAR(change("device_depth_mm") / (1e-3 * change("state_seq")), kRigFeed_mm_per_s, 0.02 * kRigFeed_mm_per_s)
+      << "mm/s; a tick is 1 ms";
+  EXPECT_LE(near_cortex(rig, "feed_mm_per_s"), 1.02 * kRigFeed_mm_per_s);
 }
 
 TEST_F(DrillingRoom, HandsAreHeldBackByTheCortexAndPlungeWhenItGivesWay) {
@@ -254,9 +259,9 @@ TEST_F(DrillingRoom, AKilledViewerAndAKilledAudioClientDisturbNobody) {
     }
     after_the_kill += 1e-9 * rig.cuts["closed_mono_ns"][i] > results_->killed_s;
   }
-  EXPECT_GT(after_the_kill, 1000);  // 25 s of drilling, a cut every 8 ms
+  EXPECT_GT(after_the_kill, 500);  // 12 s of drilling, a cut every 8 ms
   // The remaining viewer and audio client ran to the end. Their own tests check what they show and play.
-  EXPECT_GT(results_->sound.size(), 48000u * 60u);
+  EXPECT_GT(results_->sound.size(), 48000u * 40u);
 }
 
 }  // namespace

@@ -1,6 +1,7 @@
 """A small client of Osteon's server in Python, made from deploy/docs/protocol.md and the files of proto/ alone."""
 import collections
 import contextlib
+import functools
 import importlib
 import os
 import queue
@@ -90,6 +91,12 @@ class Member:
         return self.rooms.GetStatus(room.GetStatusRequest(), timeout=20)
 
 
+@functools.cache  # Tests ask for most blocks several times, and Python needs 10 ms for each.
+def mesh_of(key, payload, pitch_mm):
+    _, level, *index = key
+    return wire.decode_block(index, payload, pitch_mm / 2 ** level)
+
+
 class Surface:
     """The surface as a viewer without a camera gets it: every block in full detail."""
 
@@ -128,8 +135,8 @@ class Surface:
     def triangles(self):
         """The triangles of all blocks, each as three points."""
         out = []
-        for (_, level, *index), payload in sorted(self.blocks.items()):
-            mesh = wire.decode_block(index, payload, self.member.joined.pitch_mm / 2 ** level)
+        for key, payload in sorted(self.blocks.items()):
+            mesh = mesh_of(key, payload, self.member.joined.pitch_mm)
             out += [tuple(mesh.positions[i] for i in triangle) for triangle in mesh.triangles]
         return out
 

@@ -1,10 +1,15 @@
 """Joining, coming back, and the history that a client can check, against real servers. See stage.py."""
+import atexit
 import collections
 import contextlib
+import functools
+import shutil
 import sqlite3
 import subprocess
+import tempfile
 import time
 import unittest
+from pathlib import Path
 
 import grpc
 
@@ -164,10 +169,18 @@ class Joining(Case):
 class Rights(Case):
     """A server with certificates and tickets."""
 
-    def prepare(self):
+    @staticmethod
+    @functools.cache  # Eight programs make them.
+    def certificates():
+        folder = tempfile.TemporaryDirectory(prefix="osteon-protocol-")
+        atexit.register(folder.cleanup)
         for arguments in (("authority",), ("server", "127.0.0.1"), ("person", "anna"), ("person", "ben")):
-            subprocess.run([SOURCE / "deploy" / "certs", "--into", self.folder / "certs", *arguments], check=True,
+            subprocess.run([SOURCE / "deploy" / "certs", "--into", Path(folder.name) / "certs", *arguments], check=True,
                            capture_output=True, timeout=60)
+        return Path(folder.name) / "certs"
+
+    def prepare(self):
+        shutil.copytree(self.certificates(), self.folder / "certs")
 
     def access(self):
         return "--certificates", self.folder / "certs" / "server"

@@ -45,7 +45,7 @@ class TheSurface(Case):
         """Flags and normals of a block 20 x 20 x 10 mm, in which a ball of 3.2 mm went along x, 1 to 4.2 mm deep."""
         seen = {True: 0, False: 0}
         for key, payload in surface.blocks.items():
-            mesh = wire.decode_block(key[2:], payload, self.hand.joined.pitch_mm / 2 ** key[1])
+            mesh = client.mesh_of(key, payload, self.hand.joined.pitch_mm)
             for at, normal, is_cut in zip(mesh.positions, mesh.normals, mesh.cut):
                 self.assertAlmostEqual(math.hypot(*normal), 1, places=6)
                 centre = (min(max(at[0], -2), 2), 0, -2.6)  # of the ball when it was nearest
@@ -109,7 +109,7 @@ class TheMetal(Case):
         self.assertEqual(bag(surface.triangles()), bag(stl_triangles(self.folder / "bone.stl")))
         depths = {0: [], 1: [], 2: []}
         for key, payload in surface.blocks.items():
-            mesh = wire.decode_block(key[2:], payload, self.hand.joined.pitch_mm / 2 ** key[1])
+            mesh = client.mesh_of(key, payload, self.hand.joined.pitch_mm)
             for position, tissue in zip(mesh.positions, mesh.tissue):
                 if max(abs(position[0]), abs(position[1])) > 5 and -8 < position[2] < -1:  # the sides
                     depths[tissue].append(position[2])

@@ -227,7 +227,7 @@ TEST(Replay, OfAPointerNeedsTheFirstTickToo) {
 TEST(Replay, OfADamagedFileIsReadOrRefused) {
   constexpr int kTrials = 60;
   const osteon::test::TempDir temp;
-  record(block_case(), {drill(HandKind::expert, {0.1, -0.2, 0})}, {}, temp / "a.h5");
+  record(block_case(), {drill(HandKind::rig, {0.1, -0.2, 0}, 3.0)}, {}, temp / "a.h5");
   const std::string whole = osteon::test::content(temp / "a.h5");
   std::mt19937 random(1);
   int refused = 0;
@@ -248,8 +248,8 @@ TEST(Replay, OfADamagedFileIsReadOrRefused) {
 TEST(Replay, MovesTheBoneAsItMoved) {
   const osteon::test::TempDir temp;
   const Case bone = block_case(16.0);
-  const std::vector<PlanStep> plan{drill(HandKind::expert, {3.1, -0.2, 0}, 8.0),
-                                   drill(HandKind::rig, {-3.4, 2.2, 0}, 8.0)};
+  const std::vector<PlanStep> plan{drill(HandKind::expert, {3.1, -0.2, 0}, 4.0),
+                                   drill(HandKind::rig, {-3.4, 2.2, 0}, 4.0)};
   const auto sways = [](std::uint64_t tick) {
     const double t = 1e-3 * static_cast<double>(tick);
     return Pose{Vec3(0.2 * std::sin(1.3 * t), 0.1, 0.6 * std::sin(0.7 * t + 0.3)),
@@ -299,10 +299,10 @@ TEST(Replay, EndsWithARecordingThatWasBrokenOff) {
 TEST(Replay, AnotherRecordingMakesAnotherBone) {
   const osteon::test::TempDir temp;
   const Case bone = block_case();
-  const std::vector<PlanStep> through{drill(HandKind::rig, {0.1, -0.2, 0})};
-  std::vector<PlanStep> half = through;
-  half[0].to_mm = 7;
-  const Session one = record(bone, through, {}, temp / "a.h5"), other = record(bone, half, {}, temp / "b.h5");
+  const std::vector<PlanStep> deep{drill(HandKind::rig, {0.1, -0.2, 0}, 4.0)};
+  std::vector<PlanStep> half = deep;
+  half[0].to_mm = 2;
+  const Session one = record(bone, deep, {}, temp / "a.h5"), other = record(bone, half, {}, temp / "b.h5");
   EXPECT_NE(one.field_hash, other.field_hash);
   EXPECT_EQ(replay(bone, half, temp / "b.h5").field_hash, other.field_hash);
 }

@@ -45,9 +45,8 @@ class Rig {
     const LoopReport report = loop_.tick(input_, patch_);
     CutPiece piece;
     while (loop_.take_piece(piece)) {
-      const Cut cut = cut_of(piece, loop_.tool(0), AuthorId{1}, 0);
-      replica_.add_own(cut);
-      replica_.commit(RoomSeq{++seq_}, cut, true);
+      // No room confirms it: that would cut the same bone again, in a field that the hand does not feel.
+      replica_.add_own(cut_of(piece, loop_.tool(0), AuthorId{1}, 0));
     }
     if (++ticks_ % 12 == 0) build(report.pose_bone_proxy);
     return report;
@@ -103,7 +102,6 @@ class Rig {
   Patch patch_;
   LoopInput input_;
   std::int64_t ticks_ = 0;
-  std::uint64_t seq_ = 0;
 };
 
 // Mean over the cutting ticks between two depths of the tip.
@@ -139,7 +137,7 @@ TEST(ToolEffects, AToolResistsByTheLawThatIsChosen) {
   for (const auto& chosen : kLaws) {
     Rig rig(slab(12.0, 1.9), drill, params, chosen.law);
     // The coupling's stretch settles within about force / K_c / feed, a second.
-    const Mean mean = between(rig.move({0, 0, 9.0}, 9.0), 5.0, 7.0);
+    const Mean mean = between(rig.move({0, 0, 7.5}, 7.5), 4.5, 5.9);
     ASSERT_GT(mean.ticks, 500) << (chosen.law ? chosen.law : "default");
     // The spindle droops by some percent under the load.
     EXPECT_NEAR(mean.force_n, chosen.newtons, 0.05 * chosen.newtons) << (chosen.law ? chosen.law : "default");
@@ -251,11 +249,12 @@ TEST(ToolEffects, ALawSaysWhereItIsOutsideItsRange) {
   for (const auto& moment : kMoments) {
     Rig rig(slab(12.0, moment.density), drill);
     int cutting = 0;
-    for (const LoopReport& r : rig.move({0, 0, 9.0}, 9.0 / moment.feed)) {
+    // By 2 mm the drill has the feed of its hand.
+    for (const LoopReport& r : rig.move({0, 0, 5.0}, 5.0 / moment.feed)) {
       const double z = r.pose_bone_proxy.position_mm.z();
       if (r.cutting.phase != CuttingPhase::cutting)
         EXPECT_EQ(r.cutting.out_of_range, 0u);
-      else if (z > 5.0 && z < 7.0) {
+      else if (z > 2.0 && z < 3.7) {
         ++cutting;
         EXPECT_EQ(r.cutting.out_of_range, moment.outside)
             << moment.density << " g/cm3, " << r.cutting.feed_mm_per_s << " mm/s";
@@ -317,7 +316,7 @@ TEST(ToolEffects, AReamersThrustIsOfTheEdgesInBone) {
         },
         [](const Vec3&) { return 0.6; });
     Rig rig(block, reamer);
-    const Mean mean = between(rig.move({0, 0, 6.0}, 12.0), 4.0, 5.5);
+    const Mean mean = between(rig.move({0, 0, 4.0}, 8.0), 2.2, 3.0);
     EXPECT_GT(mean.ticks, 1000);
     return mean.force_n;
   };
