@@ -114,8 +114,9 @@ Result<std::string> run_record(RecordArguments a) {
   a.input.channels = static_cast<unsigned>(a.channels);
   auto input = SoundInput::open(a.input);
   if (!input) return tl::unexpected(input.error());
-  auto writer = sound::WavWriter::open(a.out, {.rate_hz = a.rate_hz, .channels = a.channels, .bits = a.bits},
-                                       sound::Unfinished::kept);
+  auto writer =
+      sound::WavWriter::open(a.out, {.rate_hz = a.rate_hz, .channels = a.channels, .bits = a.bits},
+                             sound::Unfinished::kept, a.overwrite ? sound::Older::replaced : sound::Older::kept);
   if (!writer) return tl::unexpected(writer.error());
   if (auto started = (*input)->start(); !started) return tl::unexpected(started.error());
 

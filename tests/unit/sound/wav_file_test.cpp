@@ -264,6 +264,37 @@ TEST(WavWriter, WhatIsKeptAndCannotGetItsNameIsLeftAndNamed) {
   EXPECT_EQ(read->samples.size(), samples.size());
 }
 
+TEST(WavWriter, ReplacesNoFileThatWasMadeMeanwhile) {
+  const test::TempDir temp;
+  const fs::path file = temp / "a.wav", partial = temp / ("a.wav.partial-" + std::to_string(::getpid()));
+  const std::vector<float> samples = tone(440, 0.5, 22050, 22050);
+  {
+    auto writer = WavWriter::open(file, kRecording, Unfinished::kept, Older::kept);
+    ASSERT_TRUE(writer) << writer.error().message;
+    ASSERT_TRUE(writer->write(samples));
+    put(file, "of another recorder");
+    const auto closed = writer->close();
+    ASSERT_FALSE(closed);
+    EXPECT_EQ(closed.error().code, ErrorCode::exists);
+    EXPECT_THAT(closed.error().message, testing::AllOf(testing::HasSubstr("another program made " + file.string()),
+                                                       testing::HasSubstr(partial.string() + " has the sound")));
+  }
+  EXPECT_EQ(test::content(file), "of another recorder");
+  const auto read = read_wav(partial);
+  ASSERT_TRUE(read) << read.error().message;
+  EXPECT_EQ(read->samples.size(), samples.size());
+}
+
+TEST(WavWriter, ThatReplacesNothingGivesANewFileItsName) {
+  const test::TempDir temp;
+  auto writer = WavWriter::open(temp / "a.wav", kRecording, Unfinished::kept, Older::kept);
+  ASSERT_TRUE(writer) << writer.error().message;
+  ASSERT_TRUE(writer->write(tone(440, 0.5, 22050, 22050)));
+  const auto closed = writer->close();
+  ASSERT_TRUE(closed) << closed.error().message;
+  EXPECT_EQ(test::names_in(temp.path()), std::set<std::string>{"a.wav"});
+}
+
 TEST(WavFile, OfACutFileIsReadWhatIsThere) {
   const test::TempDir temp;
   ASSERT_TRUE(write_wav(temp / "whole.wav", tone(440, 0.5, 8000, 22050), 22050));
