@@ -82,7 +82,9 @@ std::string to_text(const ModelReport& report) {
 
 Result<sound::SpectralModel> read_model(const std::string& file) {
   std::error_code error;
-  if (std::filesystem::exists(file, error) && !std::filesystem::is_regular_file(file, error))
+  if (!std::filesystem::exists(file, error))
+    return failure(ErrorCode::not_found, "there is no file " + file + "; give one that osteon-audio model --out wrote");
+  if (!std::filesystem::is_regular_file(file, error))
     return bad_input(file + " is a folder, a device or a pipe; give a file of osteon-audio model --out");
   const std::uintmax_t size = std::filesystem::file_size(file, error);
   if (!error && size > sound::kLargestModel_bytes)

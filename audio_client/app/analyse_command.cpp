@@ -12,6 +12,7 @@
 #include "audio_client/analysis/analysis.hpp"
 #include "audio_client/analysis/analysis_report.hpp"
 #include "audio_client/analysis/displacement_file.hpp"
+#include "audio_client/app/output_file.hpp"
 #include "audio_client/app/recording_option.hpp"
 #include "common/runtime/number_option.hpp"
 #include "common/runtime/stop_signal.hpp"
@@ -56,9 +57,8 @@ Result<std::vector<DisplacementRow>> displacement_of(const AnalyseArguments& a, 
 
 Result<std::string> run_analysis(const AnalyseArguments& a) {
   // What would be found after the work is found before it.
-  std::error_code ignored;
-  if (!a.out.empty() && std::filesystem::exists(a.out, ignored))
-    return failure(ErrorCode::exists, a.out + " is already there; give --out another name or remove it first");
+  if (!a.out.empty())
+    if (auto usable = check_new_folder(a.out, "--out"); !usable) return tl::unexpected(usable.error());
   const auto recording = read(a.recording);
   if (!recording) return tl::unexpected(recording.error());
   const auto free = free_span(a, recording->seconds());
@@ -97,9 +97,11 @@ void add_analyse_command(CLI::App& app, std::function<Result<std::string>()>& ch
       "analyse", "Analyse a recorded drilling: its states, spectra, wavelet packets, and the lines of the gears");
   add_recording(*command, a.recording);
   CLI::Option* out =
-      command->add_option("--out", a.out,
-                          "Folder, made by this command: analysis.json, tables (psd.csv, spectrogram.csv, packets.csv, "
-                          "states.csv, gears.csv, bands.csv), pictures, and the sound difference (difference.wav)");
+      command
+          ->add_option("--out", a.out,
+                       "Folder, made by this command: analysis.json, tables (psd.csv, spectrogram.csv, packets.csv, "
+                       "states.csv, gears.csv, bands.csv), pictures, and the sound difference (difference.wav)")
+          ->check(given_name());
   command
       ->add_option("--rpm", a.spindle_rpm,
                    "Speed of the spindle, which says where the lines of the gears are; they are those of "

@@ -28,6 +28,7 @@
 #include "audio_client/app/output_file.hpp"
 #include "audio_client/app/preset_command.hpp"
 #include "audio_client/app/record_command.hpp"
+#include "audio_client/app/recording_option.hpp"
 #include "audio_client/app/render_command.hpp"
 #include "audio_client/net/state_subscription.hpp"
 #include "audio_client/output/audio_output.hpp"
@@ -394,11 +395,14 @@ int main(int argc, char** argv) try {
                  "Preset of a tool's sound, or a folder of presets, which go before those of Osteon; may be repeated")
       ->allow_extra_args(false);
   app.add_option("--wav", options.wav_file,
-                 "Record the sound: 48 kHz, 16 bit, both channels, or one with --listen mono");
+                 "Record the sound: 48 kHz, 16 bit, both channels, or one with --listen mono")
+      ->check(audio::given_name());
   app.add_flag("--overwrite", options.overwrite, "Replace an existing file of --wav");
   app.add_option("--state-log", options.state_log_file,
-                 "CSV: when each cutting state was received and when it was played");
-  app.add_option("--summary", options.summary_file, "JSON written at the end: frames, latencies, callback work, peak");
+                 "CSV: when each cutting state was received and when it was played")
+      ->check(audio::given_name());
+  app.add_option("--summary", options.summary_file, "JSON written at the end: frames, latencies, callback work, peak")
+      ->check(audio::given_name());
   app.add_option("--window", options.window,
                  "Socket of the window osteon, which starts this program by itself: the window sets the volume and "
                  "shows the sound. A missing sound server is then waited for");

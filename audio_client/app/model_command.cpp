@@ -68,8 +68,8 @@ void add_model_commands(CLI::App& app, std::function<Result<std::string>()>& cho
   CLI::App* command = app.add_subcommand(
       "model", "Model a recording by partials, noise and impacts, and print how near the model's sound comes to it");
   add_recording(*command, model->recording);
-  command->add_option("--out", model->out, "File for the model");
-  command->add_option("--play", model->play, "WAV file for the sound of the model");
+  command->add_option("--out", model->out, "File for the model")->check(given_name());
+  command->add_option("--play", model->play, "WAV file for the sound of the model")->check(given_name());
   command
       ->add_option("--refine", model->refinements,
                    "Rounds in which each peak is estimated again without the others; 0 is the fastest")
@@ -83,7 +83,7 @@ void add_model_commands(CLI::App& app, std::function<Result<std::string>()>& cho
   const auto again = std::make_shared<ResynthesiseArguments>();
   command = app.add_subcommand("resynthesise", "Make the sound of a model that the command model has written");
   command->add_option("MODEL", again->model, "File of a model")->required();
-  command->add_option("OUT", again->out, "WAV file for its sound, 16 bit, mono")->required();
+  command->add_option("OUT", again->out, "WAV file for its sound, 16 bit, mono")->required()->check(given_name());
   command->add_option("--seed", again->seed, "Of the phases and the noise: the same gives the same sound")
       ->check(whole_number())
       ->capture_default_str();

@@ -21,4 +21,8 @@ struct OtherFile {
 [[nodiscard]] Result<void> check_output(const std::string& file, const std::string& what, const std::string& option,
                                         const std::vector<OtherFile>& others);
 
+// A new folder for a command: its name is free, and it can be made. A name whose parents are missing is refused, as of
+// a file: it is rather misspelt. Errors: exists, internal; name folder and option.
+[[nodiscard]] Result<void> check_new_folder(const std::string& folder, const std::string& option);
+
 }  // namespace osteon::audio

@@ -92,7 +92,7 @@ void add_preset_command(CLI::App& app, std::function<Result<std::string>()>& cho
   CLI::App* command =
       app.add_subcommand("preset", "Make a preset from a recording of a tool, to be played by osteon-audio --preset");
   add_recording(*command, a->recording);
-  command->add_option("--out", a->out, "File for the preset, YAML")->required();
+  command->add_option("--out", a->out, "File for the preset, YAML")->required()->check(given_name());
   command->add_option("--tool", a->tool, "The tool that was recorded: a kind such as drill or broach, or its name")
       ->capture_default_str();
   command

@@ -121,7 +121,8 @@ Result<WavRecorder> WavRecorder::open(const std::filesystem::path& file, unsigne
   info.format = SF_FORMAT_WAV | SF_FORMAT_PCM_16;
   impl->file = sf_open_fd(*descriptor, SFM_WRITE, &info, SF_TRUE);
   if (!impl->file) {
-    return failure(ErrorCode::internal, "cannot write the recording " + file.string() + ": " + sf_strerror(nullptr));
+    return failure(ErrorCode::internal,
+                   "cannot write the recording " + file.string() + ": " + said(errno != 0 ? errno : EIO));
   }
   sf_command(impl->file, SFC_SET_CLIPPING, nullptr, SF_TRUE);
   impl->writer = std::jthread([raw = impl.get()](const std::stop_token& stop) { raw->run(stop); });

@@ -297,6 +297,9 @@ Result<RecordedPreset> struck(std::span<const float> x, const ToolModel& base, c
     blow.modes.push_back({peak.hz, decay_s, std::min(0.0, peak.level_db + sound::power_db(2.0 / blows) + then_db)});
   }
   made.text += said("blows      %zu\nmodes      %zu\n", analysis.impacts.size(), blow.modes.size());
+  if (blow.modes.empty())
+    made.text +=
+        "note       nothing rings after the blows, so the preset has little to sound; is it the right --tool?\n";
   for (const sound::Transient& transient : analysis.model.transients)
     if (made.model.transients.size() < kMostTransients) made.model.transients.push_back(transient.samples);
   if (!made.model.transients.empty()) blow.click_db = 0.0;  // as recorded

@@ -55,7 +55,9 @@ struct WavWriter::Impl {
   Result<void> end();  // writes the header, and closes the file
 
   [[nodiscard]] std::string not_whole(const std::error_code& why) const {
-    return "the sound " + file.string() + " could not be written whole (" + why.message() + ")";
+    const bool full = why == std::errc::no_space_on_device;
+    return "the sound " + file.string() + " could not be written whole (" + why.message() +
+           (full ? "; make room on the disk)" : ")");
   }
   [[nodiscard]] tl::unexpected<Error> not_written(const std::error_code& why) {
     failed = true;
@@ -107,9 +109,10 @@ Result<WavWriter> WavWriter::open(const fs::path& file, const WavFormat& format,
   info.samplerate = format.rate_hz;
   info.channels = format.channels;
   info.format = SF_FORMAT_WAV | (format.bits == 16 ? SF_FORMAT_PCM_16 : SF_FORMAT_PCM_24);
+  errno = 0;
   impl->out = sf_open(impl->partial.c_str(), SFM_WRITE, &info);
   if (!impl->out)
-    return failure(ErrorCode::internal, "cannot write the sound " + file.string() + ": " + sf_strerror(nullptr) +
+    return failure(ErrorCode::internal, "cannot write the sound " + file.string() + ": " + reason().message() +
                                             "; choose a place where you may write");
   sf_command(impl->out, SFC_SET_CLIPPING, nullptr, SF_TRUE);
   return WavWriter(std::move(impl));

@@ -586,6 +586,9 @@ TEST_F(AnalyseProgram, WrongUseIsOneSentenceEach) {
       {{put("slow.wav", slow)}, {"slow.wav", "SampleRate is 8000", "44100"}},
       {{temp_.path().string()}, {"folder"}},
       {{drilling, "--out", "/proc/nowhere/out"}, {"/proc/nowhere/out", "may write"}},
+      {{drilling, "--out", (temp_ / "no/folder").string()}, {"no/folder", "--out", "a folder that exists"}},
+      {{drilling, "--out", (temp_ / "no/folder/").string()}, {"no/folder/", "--out", "a folder that exists"}},
+      {{drilling, "--out", ""}, {"--out: the name is empty", "osteon-audio analyse --help"}},
       {{drilling, "--out", drilling}, {"drilling.wav", "already there"}},
       {{drilling, "--channel", "middle"}, {"--channel", "middle"}},
       {{drilling, "--rpm", "0"}, {"--rpm"}},
@@ -621,6 +624,8 @@ TEST_F(AnalyseProgram, WrongUseIsOneSentenceEach) {
        {"h.csv: line 2 has 4 fields, and line 1 has 2", "with a point"}},
       {{drilling, "--out", (temp_ / "out").string(), "--displacement", put("i.csv", "time_s;depth_mm\n0;1\n")},
        {"i.csv", "separated by a comma"}},
+      {{drilling, "--out", (temp_ / "out").string(), "--displacement", put("j.csv", "time_s,depth_mm,time_s\n0,1,2\n")},
+       {"j.csv: line 1 has the column time_s more than once"}},
       {{drilling, "--out", (temp_ / "out").string(), "--displacement", put("g.csv", "")}, {"g.csv", "time_s"}},
   };
   for (const Wrong& wrong : cases) {
@@ -632,6 +637,7 @@ TEST_F(AnalyseProgram, WrongUseIsOneSentenceEach) {
     EXPECT_EQ(result.out, "");
   }
   EXPECT_FALSE(fs::exists(temp_ / "out"));
+  EXPECT_FALSE(fs::exists(temp_ / "no"));
 }
 
 }  // namespace

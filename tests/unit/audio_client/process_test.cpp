@@ -275,6 +275,9 @@ TEST(AudioProgram, WrongInputsAreOneSentenceEach) {
        "--hrtf another file"},
       {{"--server", "127.0.0.1:1", "--plain", "--output", "none", "--listener", "0", "0", "0"}, "--listener"},
       {{"--server", "127.0.0.1:1", "--plain", "--output", "none", "--device", "0"}, "--output pulse"},
+      {{"--server", "127.0.0.1:1", "--plain", "--output", "none", "--timeout", "nan"}, "nan is not a number from 0"},
+      {{"--server", "127.0.0.1:1", "--plain", "--output", "none", "--wav", ""}, "--wav: the name is empty"},
+      {{"--server", "127.0.0.1:1", "--plain", "--output", "none", "--summary", ""}, "--summary: the name is empty"},
       {{"devices"}, "no sound server answers"},
   };
   for (const Case& wrong : cases) {
