@@ -12,6 +12,8 @@
 #include "audio_client/app/output_file.hpp"
 #include "audio_client/app/recording_option.hpp"
 #include "common/runtime/files.hpp"
+#include "common/runtime/stop_signal.hpp"
+#include "common/runtime/stoppable_progress.hpp"
 
 namespace osteon::audio {
 namespace {
@@ -31,7 +33,11 @@ Result<std::string> run_model(const ModelArguments& a) {
     return tl::unexpected(usable.error());
   const auto recording = read(a.recording);
   if (!recording) return tl::unexpected(recording.error());
-  const ModelReport report = model_report(*recording, a.refinements, a.seed);
+  const StopSignal stop(StopSignal::HangUp::stops);
+  StoppableProgress progress(stop, "modelling", kQuietWork);
+  const auto made = model_report(*recording, a.refinements, a.seed, [&](double done) { return progress.go_on(done); });
+  if (!made) return stopped_before({a.out, a.play});
+  const ModelReport& report = *made;
   std::string text = to_text(report);
   if (!a.out.empty()) {
     if (auto written = write_file(a.out, report.bytes); !written) return tl::unexpected(written.error());

@@ -32,6 +32,16 @@ Result<void> check_output(const std::string& file, const std::string& what, cons
   return check_writable(file, what, option);
 }
 
+tl::unexpected<Error> stopped_before(const std::vector<std::string>& files) {
+  std::string names;
+  for (const std::string& file : files)
+    if (!file.empty()) names += (names.empty() ? "" : " and ") + file;
+  const bool several = names.find(" and ") != std::string::npos;
+  return failure(ErrorCode::cancelled, names.empty()
+                                           ? std::string("stopped; nothing was written")
+                                           : "stopped; " + names + (several ? " were" : " was") + " not written");
+}
+
 Result<void> check_new_folder(const std::string& folder, const std::string& option) {
   std::error_code ignored;
   const fs::path path(folder), target = path.has_filename() ? path : path.parent_path();

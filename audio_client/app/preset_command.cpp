@@ -14,6 +14,8 @@
 #include "common/core/bounded_text.hpp"
 #include "common/runtime/files.hpp"
 #include "common/runtime/number_option.hpp"
+#include "common/runtime/stop_signal.hpp"
+#include "common/runtime/stoppable_progress.hpp"
 #include "common/tools/tool.hpp"
 #include "common/tools/tool_file.hpp"
 
@@ -61,7 +63,11 @@ Result<std::string> run_preset(const PresetArguments& a) {
                         .refinements = a.refinements};
   params.name = bounded_text(params.name.substr(0, 60));
   if (std::ranges::find(base->tools, a.tool) == base->tools.end()) params.tools = {a.tool};
-  auto made = recorded_preset(recording->samples, recording->rate_hz, *base, params);
+  const StopSignal stop(StopSignal::HangUp::stops);
+  StoppableProgress progress(stop, "modelling", kQuietWork);
+  auto made = recorded_preset(recording->samples, recording->rate_hz, *base, params,
+                              [&](double done) { return progress.go_on(done); });
+  if (!made && made.error().code == ErrorCode::cancelled) return stopped_before({a.out});
   if (!made) return failure(made.error().code, a.recording.file + ": " + made.error().message);
   const std::string yaml = to_yaml(made->model);
   if (auto written = write_file(a.out, yaml); !written) return tl::unexpected(written.error());
