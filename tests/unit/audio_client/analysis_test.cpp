@@ -595,21 +595,36 @@ TEST_F(AnalyseProgram, AStopIsOneSentenceAndWritesNothing) {
   EXPECT_FALSE(fs::exists(temp_ / "out"));
 }
 
-TEST_F(AnalyseProgram, WrongUseIsOneSentenceEach) {
-  const auto put = [&](const char* name, std::string_view text) {
+// Wrong use of the program, and what its one sentence says.
+class AnalyseWrongUse : public AnalyseProgram {
+ protected:
+  struct Wrong {
+    std::vector<std::string> arguments;
+    std::vector<std::string> says;
+  };
+  [[nodiscard]] std::string put(const char* name, std::string_view text) const {
     std::ofstream(temp_ / name, std::ios::binary) << text;
     return (temp_ / name).string();
-  };
+  }
+  void expect_one_sentence_each(const std::vector<Wrong>& cases) const {
+    for (const Wrong& wrong : cases) {
+      const test::RunResult result = analyse_with(wrong.arguments);
+      EXPECT_EQ(result.exit_code, 1) << wrong.says.front();
+      EXPECT_THAT(result.err, testing::StartsWith("osteon-audio: "));
+      for (const std::string& words : wrong.says) EXPECT_THAT(result.err, testing::HasSubstr(words));
+      EXPECT_EQ(std::ranges::count(result.err, '\n'), 1) << result.err;
+      EXPECT_EQ(result.out, "");
+    }
+  }
+};
+
+TEST_F(AnalyseWrongUse, IsOneSentenceEach) {
   const std::string whole = test::content(wav());
   const std::string drilling = wav().string();
   std::string stereo = whole, slow = whole;
   stereo[22] = 2, stereo[32] = 4;                  // NumChannels, BlockAlign
   slow[24] = 0x40, slow[25] = 0x1F, slow[26] = 0;  // SampleRate 8000
   const std::string table = put("late.csv", "time_s,depth_mm\n100,2\n110,3\n");
-  struct Wrong {
-    std::vector<std::string> arguments;
-    std::vector<std::string> says;
-  };
   const std::vector<Wrong> cases = {
       {{"nothing.wav"}, {"nothing.wav", "give the path"}},
       {{}, {"FILE"}},
@@ -638,6 +653,16 @@ TEST_F(AnalyseProgram, WrongUseIsOneSentenceEach) {
       {{drilling, "--from", "3", "--to", "3.1"}, {"drilling.wav", "the part lasts 0.1 s"}},
       {{drilling, "--displacement", table}, {"--displacement", "--out"}},
       {{drilling, "--displacement-start", "1"}, {"--displacement-start", "--displacement"}},
+  };
+  expect_one_sentence_each(cases);
+  EXPECT_FALSE(fs::exists(temp_ / "out"));
+  EXPECT_FALSE(fs::exists(temp_ / "no"));
+}
+
+TEST_F(AnalyseWrongUse, OfATableIsOneSentenceEach) {
+  const std::string drilling = wav().string();
+  const std::string table = put("late.csv", "time_s,depth_mm\n100,2\n110,3\n");
+  const std::vector<Wrong> cases = {
       {{drilling, "--out", (temp_ / "out").string(), "--displacement", table},
        {"late.csv", "100 to 110 s", "--displacement-start"}},
       {{drilling, "--out", (temp_ / "out").string(), "--displacement", temp_.path().string()}, {"folder"}},
@@ -662,16 +687,8 @@ TEST_F(AnalyseProgram, WrongUseIsOneSentenceEach) {
        {"j.csv: line 1 has the column time_s more than once"}},
       {{drilling, "--out", (temp_ / "out").string(), "--displacement", put("g.csv", "")}, {"g.csv", "time_s"}},
   };
-  for (const Wrong& wrong : cases) {
-    const test::RunResult result = analyse_with(wrong.arguments);
-    EXPECT_EQ(result.exit_code, 1) << wrong.says.front();
-    EXPECT_THAT(result.err, testing::StartsWith("osteon-audio: "));
-    for (const std::string& words : wrong.says) EXPECT_THAT(result.err, testing::HasSubstr(words));
-    EXPECT_EQ(std::ranges::count(result.err, '\n'), 1) << result.err;
-    EXPECT_EQ(result.out, "");
-  }
+  expect_one_sentence_each(cases);
   EXPECT_FALSE(fs::exists(temp_ / "out"));
-  EXPECT_FALSE(fs::exists(temp_ / "no"));
 }
 
 }  // namespace

@@ -320,20 +320,16 @@ TEST(WavFile, ADamagedHeaderIsNamed) {
   const test::TempDir temp;
   ASSERT_TRUE(write_wav(temp / "a.wav", tone(440, 0.5, 8000, 22050), 22050));
   const std::string whole = test::content(temp / "a.wav");
-  for (const std::size_t at : {22U, 24U, 34U}) {  // NumChannels, SampleRate, BitsPerSample
+  for (const std::size_t at : {22U, 24U}) {  // NumChannels, SampleRate
     std::string damaged = whole;
     damaged.replace(at, 2, std::string(2, '\0'));
     put(temp / "b.wav", damaged);
     const auto read = read_wav(temp / "b.wav");
-    if (read) continue;  // libsndfile knows better
-    EXPECT_THAT(read.error().message, testing::AllOf(testing::HasSubstr((temp / "b.wav").string()),
-                                                     testing::ContainsRegex("convert|record it"),
-                                                     testing::Not(testing::HasSubstr("rror :"))));
+    ASSERT_FALSE(read) << at;
+    EXPECT_THAT(read.error().message,
+                testing::AllOf(testing::HasSubstr((temp / "b.wav").string()), testing::ContainsRegex("convert|record"),
+                               testing::Not(testing::HasSubstr("rror :"))));
   }
-  std::string silent = whole;
-  silent.replace(22, 2, std::string(2, '\0'));
-  put(temp / "b.wav", silent);
-  EXPECT_FALSE(read_wav(temp / "b.wav"));
 }
 
 TEST(WavFile, ASizeThatNobodyWroteIsThatOfTheFile) {
