@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
+#include <iterator>
 
 #include "common/sound/levels.hpp"
 #include "common/sound/resample.hpp"
@@ -90,6 +92,18 @@ std::optional<Difference> difference_of(const SoundAnalysis& a) {
   return difference;
 }
 
+void add_spectra(SoundAnalysis& a) {
+  for (int i = 0; i < sound::kDrillingStates; ++i) {
+    const auto state = static_cast<sound::DrillingState>(i);
+    const auto span = longest(a.states, state);
+    if (!span) continue;
+    StateSpectrum of{.state = state, .span = *span, .spectrum = {}, .peaks = {}};
+    of.spectrum = sound::power_spectrum(part_of(a.samples, *span, a.rate_hz), a.rate_hz, a.params.spectrum_window);
+    of.peaks = sound::strongest_peaks(of.spectrum, kPeaks, kPeaksApart_hz);
+    a.spectra.push_back(std::move(of));
+  }
+}
+
 void add_packets(SoundAnalysis& a) {
   const sound::WaveletPackets packets = sound::wavelet_packets(a.samples, a.rate_hz);
   for (int level = 1; level <= sound::kMostLevels; ++level) {
@@ -112,29 +126,40 @@ const StateSpectrum* spectrum_of(const SoundAnalysis& analysis, sound::DrillingS
 }
 
 SoundAnalysis analyse(const sound::WavSound& recording, const AnalysisParams& params) {
+  return *analyse(recording, params, [](double) { return true; });
+}
+
+Result<SoundAnalysis> analyse(const sound::WavSound& recording, const AnalysisParams& params,
+                              const KeepGoing& keep_going) {
   SoundAnalysis a;
   a.params = params;
   a.file_rate_hz = recording.rate_hz, a.file_channels = recording.channels, a.file_bits = recording.bits;
   a.file_floating = recording.floating, a.announced_s = recording.announced_s;
   a.from_s = recording.from_s, a.file_s = recording.file_s;
-  a.samples = sound::resampled(recording.samples, recording.rate_hz, a.rate_hz);
-  a.level_db = sound::rms_db(a.samples);
-  a.peak = sound::peak(recording.samples);
-  a.whole = sound::power_spectrum(a.samples, a.rate_hz, params.spectrum_window);
-  a.spectrogram = sound::spectrogram(a.samples, a.rate_hz, params.spectrogram_window, kMostColumns);
-  a.states = sound::drilling_states(a.samples, a.rate_hz, {.spindle_rpm = params.spindle_rpm, .free = params.free});
-  for (int i = 0; i < sound::kDrillingStates; ++i) {
-    const auto state = static_cast<sound::DrillingState>(i);
-    const auto span = longest(a.states, state);
-    if (!span) continue;
-    StateSpectrum of{.state = state, .span = *span, .spectrum = {}, .peaks = {}};
-    of.spectrum = sound::power_spectrum(part_of(a.samples, *span, a.rate_hz), a.rate_hz, params.spectrum_window);
-    of.peaks = sound::strongest_peaks(of.spectrum, kPeaks, kPeaksApart_hz);
-    a.spectra.push_back(std::move(of));
+  const std::function<void()> parts[] = {
+      [&] {
+        a.samples = sound::resampled(recording.samples, recording.rate_hz, a.rate_hz);
+        a.level_db = sound::rms_db(a.samples);
+        a.peak = sound::peak(recording.samples);
+      },
+      [&] {
+        a.whole = sound::power_spectrum(a.samples, a.rate_hz, params.spectrum_window);
+        a.spectrogram = sound::spectrogram(a.samples, a.rate_hz, params.spectrogram_window, kMostColumns);
+      },
+      [&] {
+        a.states =
+            sound::drilling_states(a.samples, a.rate_hz, {.spindle_rpm = params.spindle_rpm, .free = params.free});
+      },
+      [&] { add_spectra(a); },
+      [&] { add_packets(a); },
+      [&] { a.lines = find_lines(a); },
+      [&] { a.difference = difference_of(a); },
+  };
+  double done = 0;
+  for (const std::function<void()>& each : parts) {
+    each();
+    if (!keep_going(++done / static_cast<double>(std::size(parts)))) return stopped_while("analysing the recording");
   }
-  add_packets(a);
-  a.lines = find_lines(a);
-  a.difference = difference_of(a);
   return a;
 }
 

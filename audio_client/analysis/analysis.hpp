@@ -4,6 +4,8 @@
 #include <optional>
 #include <vector>
 
+#include "common/core/keep_going.hpp"
+#include "common/core/result.hpp"
 #include "common/sound/drilling_states.hpp"
 #include "common/sound/gearbox.hpp"
 #include "common/sound/spectrum.hpp"
@@ -79,6 +81,9 @@ struct SoundAnalysis {
 
 // A pure function of both. It takes about 1 s for a minute of sound.
 [[nodiscard]] SoundAnalysis analyse(const sound::WavSound& recording, const AnalysisParams& params);
+// The same. `keep_going` is called after each part. Error: cancelled.
+[[nodiscard]] Result<SoundAnalysis> analyse(const sound::WavSound& recording, const AnalysisParams& params,
+                                            const KeepGoing& keep_going);
 
 // The spectrum of a state, or null.
 [[nodiscard]] const StateSpectrum* spectrum_of(const SoundAnalysis& analysis, sound::DrillingState state);

@@ -64,6 +64,10 @@ Result<std::vector<DisplacementRow>> read_displacement(const std::filesystem::pa
     if (at == columns.size())
       return bad_input(file.string() + ": line 1 has no column " + name +
                        "; begin the table with time_s,displacement_mm, separated by a comma");
+  for (const std::size_t used : {time, mm})
+    if (std::ranges::count(columns, columns[used]) > 1)
+      return bad_input(file.string() + ": line 1 has the column " + std::string(columns[used]) +
+                       " more than once; keep the one that shall be drawn");
 
   std::vector<DisplacementRow> rows;
   for (int number = 2; !rest.empty(); ++number) {

@@ -4,6 +4,7 @@
 #include <cstdio>
 #include <ctime>
 #include <filesystem>
+#include <utility>
 
 #include "audio_client/analysis/analysis.hpp"
 #include "common/core/check.hpp"
@@ -32,14 +33,17 @@ std::string line(const char* format, Values... values) {
 
 }  // namespace
 
-ModelReport model_report(const sound::WavSound& recording, int refinements, std::uint64_t seed) {
+Result<ModelReport> model_report(const sound::WavSound& recording, int refinements, std::uint64_t seed,
+                                 const KeepGoing& keep_going) {
   ModelReport report;
   const std::vector<float> original = sound::resampled(recording.samples, recording.rate_hz, kAnalysisRate_hz);
   sound::SpectralParams params;
   params.partials.peaks.refinements = refinements;
   // Time of the processor: other programs beside this one do not change it.
   const std::clock_t begin = std::clock();
-  report.analysis = sound::spectral_analysis(original, kAnalysisRate_hz, params);
+  auto analysis = sound::spectral_analysis(original, kAnalysisRate_hz, params, part(keep_going, 0.0, 0.8));
+  if (!analysis) return tl::unexpected(analysis.error());
+  report.analysis = std::move(*analysis);
   report.work_s = static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC;
 
   report.bytes = sound::bytes_of(report.analysis.model);
@@ -49,9 +53,14 @@ ModelReport model_report(const sound::WavSound& recording, int refinements, std:
   std::vector<float> with_phases = sound::resynthesised_noise(*kept, seed);
   for (std::size_t i = 0; i < original.size(); ++i) with_phases[i] += report.analysis.kept_sines[i];
   sound::put_transients(with_phases, kept->transients, kAnalysisRate_hz);
-  report.rows = {likeness("sines, with phases", original, report.analysis.sines),
-                 likeness("all, with phases", original, with_phases),
-                 likeness("the model, no phases", original, report.sound)};
+  const std::pair<const char*, std::span<const float>> others[] = {{"sines, with phases", report.analysis.sines},
+                                                                   {"all, with phases", with_phases},
+                                                                   {"the model, no phases", report.sound}};
+  for (const auto& [what, other] : others) {
+    if (!keep_going(0.85 + 0.05 * static_cast<double>(report.rows.size())))
+      return stopped_while("comparing the model with the recording");
+    report.rows.push_back(likeness(what, original, other));
+  }
   return report;
 }
 
@@ -82,7 +91,9 @@ std::string to_text(const ModelReport& report) {
 
 Result<sound::SpectralModel> read_model(const std::string& file) {
   std::error_code error;
-  if (std::filesystem::exists(file, error) && !std::filesystem::is_regular_file(file, error))
+  if (!std::filesystem::exists(file, error))
+    return failure(ErrorCode::not_found, "there is no file " + file + "; give one that osteon-audio model --out wrote");
+  if (!std::filesystem::is_regular_file(file, error))
     return bad_input(file + " is a folder, a device or a pipe; give a file of osteon-audio model --out");
   const std::uintmax_t size = std::filesystem::file_size(file, error);
   if (!error && size > sound::kLargestModel_bytes)

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "common/core/keep_going.hpp"
 #include "common/core/result.hpp"
 #include "common/sound/spectral_model.hpp"
 #include "common/sound/wav_file.hpp"
@@ -24,8 +25,9 @@ struct ModelReport {
   double work_s = 0;           // of one processor, for the analysis
 };
 
-// `refinements`: rounds of refinement of the peaks. `seed`: of phases and noise.
-[[nodiscard]] ModelReport model_report(const sound::WavSound& recording, int refinements, std::uint64_t seed);
+// `refinements`: rounds of refinement of the peaks. `seed`: of phases and noise. Error: cancelled.
+[[nodiscard]] Result<ModelReport> model_report(const sound::WavSound& recording, int refinements, std::uint64_t seed,
+                                               const KeepGoing& keep_going);
 
 // The table that osteon-audio model prints.
 [[nodiscard]] std::string to_text(const ModelReport& report);

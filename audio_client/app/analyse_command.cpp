@@ -12,9 +12,11 @@
 #include "audio_client/analysis/analysis.hpp"
 #include "audio_client/analysis/analysis_report.hpp"
 #include "audio_client/analysis/displacement_file.hpp"
+#include "audio_client/app/output_file.hpp"
 #include "audio_client/app/recording_option.hpp"
 #include "common/runtime/number_option.hpp"
 #include "common/runtime/stop_signal.hpp"
+#include "common/runtime/stoppable_progress.hpp"
 
 namespace osteon::audio {
 namespace {
@@ -56,9 +58,8 @@ Result<std::vector<DisplacementRow>> displacement_of(const AnalyseArguments& a, 
 
 Result<std::string> run_analysis(const AnalyseArguments& a) {
   // What would be found after the work is found before it.
-  std::error_code ignored;
-  if (!a.out.empty() && std::filesystem::exists(a.out, ignored))
-    return failure(ErrorCode::exists, a.out + " is already there; give --out another name or remove it first");
+  if (!a.out.empty())
+    if (auto usable = check_new_folder(a.out, "--out"); !usable) return tl::unexpected(usable.error());
   const auto recording = read(a.recording);
   if (!recording) return tl::unexpected(recording.error());
   const auto free = free_span(a, recording->seconds());
@@ -70,20 +71,22 @@ Result<std::string> run_analysis(const AnalyseArguments& a) {
   params.spindle_rpm = a.spindle_rpm;
   params.full_scale_pa = a.full_scale_pa;
   params.free = *free;
+  const StopSignal stop(StopSignal::HangUp::stops);
+  StoppableProgress progress(stop, "analysing", kQuietWork);
+  const KeepGoing go_on = [&](double done) { return progress.go_on(done); };
+  const double analysed = a.out.empty() ? 1.0 : 0.5;  // of the work
   // Of the processor, because other programs may run beside this one.
   const std::clock_t begin = std::clock();
-  const SoundAnalysis analysis = analyse(*recording, params);
+  const auto analysis = analyse(*recording, params, part(go_on, 0.0, analysed));
+  if (!analysis) return stopped_before({a.out});
   const double work_s = static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC;
   std::array<char, 96> speed{};
   std::snprintf(speed.data(), speed.size(), "\nanalysed   in %.3f s of a processor, %.0f times as fast as it sounds\n",
                 work_s, recording->seconds() / work_s);
-  std::string text = to_text(analysis) + speed.data();
+  std::string text = to_text(*analysis) + speed.data();
   if (a.out.empty()) return text;
-  // Until here nothing is on the disk, and a signal ends the program at once.
-  const StopSignal stop(StopSignal::HangUp::stops);
-  const auto written = write_analysis(analysis, *displacement, a.out, [&](double) { return !stop.requested(); });
-  if (!written && written.error().code == ErrorCode::cancelled)
-    return failure(ErrorCode::cancelled, "stopped; " + a.out + " was not written");
+  const auto written = write_analysis(*analysis, *displacement, a.out, part(go_on, analysed, 1.0));
+  if (!written && written.error().code == ErrorCode::cancelled) return stopped_before({a.out});
   if (!written) return tl::unexpected(written.error());
   return text + "written    " + a.out + ": analysis.json, tables (*.csv) and pictures (*.png)\n";
 }
@@ -97,9 +100,11 @@ void add_analyse_command(CLI::App& app, std::function<Result<std::string>()>& ch
       "analyse", "Analyse a recorded drilling: its states, spectra, wavelet packets, and the lines of the gears");
   add_recording(*command, a.recording);
   CLI::Option* out =
-      command->add_option("--out", a.out,
-                          "Folder, made by this command: analysis.json, tables (psd.csv, spectrogram.csv, packets.csv, "
-                          "states.csv, gears.csv, bands.csv), pictures, and the sound difference (difference.wav)");
+      command
+          ->add_option("--out", a.out,
+                       "Folder, made by this command: analysis.json, tables (psd.csv, spectrogram.csv, packets.csv, "
+                       "states.csv, gears.csv, bands.csv), pictures, and the sound difference (difference.wav)")
+          ->check(given_name());
   command
       ->add_option("--rpm", a.spindle_rpm,
                    "Speed of the spindle, which says where the lines of the gears are; they are those of "

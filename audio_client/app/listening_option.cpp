@@ -1,6 +1,7 @@
 #include "audio_client/app/listening_option.hpp"
 
 #include <CLI/CLI.hpp>
+#include <cmath>
 #include <memory>
 #include <utility>
 
@@ -37,6 +38,10 @@ Result<Space> read(const ListeningOption& option, double rate_hz) {
     return failure(ErrorCode::invalid_input, "--hrtf is of headphones only; add --listen headphones");
   Space space;
   space.listening = *way;
+  if (*way == Listening::mono && !(option.listener_mm.empty() && option.up.empty()))
+    return failure(ErrorCode::invalid_input,
+                   "--listener and --listener-up are of loudspeakers and headphones only; leave them out, or choose "
+                   "another --listen than mono");
   if (*way == Listening::mono) return space;  // from nowhere
   const auto vector = [](const std::vector<double>& given, const Vec3& usual) {
     return given.size() == 3 ? Vec3(given[0], given[1], given[2]) : usual;
@@ -47,6 +52,12 @@ Result<Space> read(const ListeningOption& option, double rate_hz) {
   const Vec3 up = vector(option.up, -Vec3::UnitY());
   if (up.norm() < 1e-6)
     return failure(ErrorCode::invalid_input, "--listener-up 0 0 0 is no direction; give one, such as 0 -1 0");
+  // Otherwise nothing says which side is left.
+  if (from_mm.normalized().cross(up.normalized()).norm() < 1e-6)
+    return failure(ErrorCode::invalid_input,
+                   "the listener looks along the direction that is up, so no side is left; give --listener-up a "
+                   "direction across the look, such as " +
+                       std::string(std::abs(up.normalized().z()) < 0.7 ? "0 0 1" : "0 -1 0"));
   space.pose_bone_head = looking(from_mm, Vec3::Zero(), up);
   if (*way != Listening::headphones) return space;
   Result<Hrtf> hrtf = read_hrtf(option.hrtf, rate_hz);

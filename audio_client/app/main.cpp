@@ -28,6 +28,7 @@
 #include "audio_client/app/output_file.hpp"
 #include "audio_client/app/preset_command.hpp"
 #include "audio_client/app/record_command.hpp"
+#include "audio_client/app/recording_option.hpp"
 #include "audio_client/app/render_command.hpp"
 #include "audio_client/net/state_subscription.hpp"
 #include "audio_client/output/audio_output.hpp"
@@ -65,6 +66,7 @@ struct Options {
   audio::ListeningOption listening;
   std::filesystem::path wav_file, state_log_file, summary_file, window;
   std::vector<std::string> presets;
+  bool overwrite = false;
   double patience_s = 5;
 };
 
@@ -89,6 +91,7 @@ class StateLog {
 
   void drain(audio::SoundEngine& engine, const audio::ReconnectingOutput& output) {
     audio::Sounded sounded;
+    errno = 0;
     while (engine.next_sounded(sounded)) {
       const auto delay = engine.latency() + output.latency();
       const std::int64_t sounded_ns = sounded.rendered_ns + std::chrono::nanoseconds(delay).count();
@@ -96,19 +99,30 @@ class StateLog {
       if (file_.is_open())
         file_ << sounded.state_seq << ',' << sounded.received_ns << ',' << sounded_ns << ',' << sounded.author << '\n';
     }
+    note_reason();
   }
 
   [[nodiscard]] Result<void> close(const std::filesystem::path& file) {
     if (!file_.is_open()) return {};
+    errno = 0;
     file_.close();
-    if (!file_) return failure(ErrorCode::internal, "the state log " + file.string() + " could not be written whole");
-    return {};
+    note_reason();
+    if (reason_ == 0) return {};
+    return failure(ErrorCode::internal, "the state log " + file.string() + " could not be written whole (" +
+                                            std::generic_category().message(reason_) +
+                                            "); make room on the disk, or give --state-log a file on another one");
   }
 
   [[nodiscard]] const DurationHistogram& latency() const { return latency_; }
 
  private:
+  // Later calls fail without one.
+  void note_reason() {
+    if (!file_ && reason_ == 0) reason_ = errno != 0 ? errno : EIO;
+  }
+
   std::ofstream file_;
+  int reason_ = 0;
   DurationHistogram latency_;
 };
 
@@ -211,6 +225,10 @@ Result<void> check_outputs(const Options& options) {
     if (Result<void> apart = audio::check_apart(file.string(), option, others); !apart) return apart;
     others.push_back({file.string(), what});
   }
+  std::error_code ignored;
+  if (!options.overwrite && std::filesystem::exists(options.wav_file, ignored))
+    return failure(ErrorCode::exists,
+                   options.wav_file.string() + " is already there; give --wav another name, or add --overwrite");
   return {};
 }
 
@@ -237,8 +255,10 @@ Result<Prepared> prepare(const Options& options) {
 
   if (Result<void> usable = check_writable(options.state_log_file, "the state log", "--state-log"); !usable)
     return tl::unexpected(usable.error());
-  if (Result<void> usable = check_writable(options.wav_file, "the recording", "--wav"); !usable)
-    return tl::unexpected(usable.error());
+  for (const auto& [file, what, option] : {std::tuple{options.wav_file, "the recording", "--wav"},
+                                           std::tuple{options.summary_file, "the summary", "--summary"}})
+    if (Result<void> usable = audio::check_output(file.string(), what, option, {}); !usable)
+      return tl::unexpected(usable.error());
   if (Result<void> apart = check_outputs(options); !apart) return tl::unexpected(apart.error());
   Result<std::vector<audio::ToolModel>> presets = audio::presets_of(options.presets);
   if (!presets) return tl::unexpected(presets.error());
@@ -274,8 +294,9 @@ Result<void> run(const Options& options, Prepared prepared, const StopSignal& st
   StateLog states;
   if (Result<void> opened = states.open(options.state_log_file); !opened) return opened;
   if (!options.wav_file.empty()) {
-    Result<audio::WavRecorder> opened = audio::WavRecorder::open(options.wav_file, output_params.rate_hz,
-                                                                 space.listening == audio::Listening::mono ? 1 : 2);
+    Result<audio::WavRecorder> opened = audio::WavRecorder::open(
+        options.wav_file, output_params.rate_hz, space.listening == audio::Listening::mono ? 1 : 2,
+        options.overwrite ? audio::Existing::replaced : audio::Existing::refused);
     if (!opened) return tl::unexpected(opened.error());
     recorder = std::move(*opened);
     engine.record_to(*recorder);
@@ -300,12 +321,18 @@ Result<void> run(const Options& options, Prepared prepared, const StopSignal& st
       });
 
   std::optional<Error> broken;
+  bool recording = recorder.has_value();
   while (!broken && !stop.wait_for(kPoll)) {
     states.drain(engine, output);
     window->attend(engine, output, output_params.rate_hz);
     if (const MutexLock lock(delivering); received_at && Clock::now() - *received_at > kStale) {
       engine.deliver(audio::SoundScene{});
       received_at.reset();
+    }
+    // The sound goes on without it.
+    if (recording && !recorder->trouble().empty()) {
+      recording = false;
+      log::warn("the recording has ended", {{"why", recorder->trouble()}});
     }
     broken = watch->ended();
     output.maintain(Clock::now(), window->there());
@@ -368,10 +395,14 @@ int main(int argc, char** argv) try {
                  "Preset of a tool's sound, or a folder of presets, which go before those of Osteon; may be repeated")
       ->allow_extra_args(false);
   app.add_option("--wav", options.wav_file,
-                 "Record the sound: 48 kHz, 16 bit, both channels, or one with --listen mono");
+                 "Record the sound: 48 kHz, 16 bit, both channels, or one with --listen mono")
+      ->check(audio::given_name());
+  app.add_flag("--overwrite", options.overwrite, "Replace an existing file of --wav");
   app.add_option("--state-log", options.state_log_file,
-                 "CSV: when each cutting state was received and when it was played");
-  app.add_option("--summary", options.summary_file, "JSON written at the end: frames, latencies, callback work, peak");
+                 "CSV: when each cutting state was received and when it was played")
+      ->check(audio::given_name());
+  app.add_option("--summary", options.summary_file, "JSON written at the end: frames, latencies, callback work, peak")
+      ->check(audio::given_name());
   app.add_option("--window", options.window,
                  "Socket of the window osteon, which starts this program by itself: the window sets the volume and "
                  "shows the sound. A missing sound server is then waited for");

@@ -12,6 +12,8 @@
 #include "audio_client/app/output_file.hpp"
 #include "audio_client/app/recording_option.hpp"
 #include "common/runtime/files.hpp"
+#include "common/runtime/stop_signal.hpp"
+#include "common/runtime/stoppable_progress.hpp"
 
 namespace osteon::audio {
 namespace {
@@ -31,7 +33,11 @@ Result<std::string> run_model(const ModelArguments& a) {
     return tl::unexpected(usable.error());
   const auto recording = read(a.recording);
   if (!recording) return tl::unexpected(recording.error());
-  const ModelReport report = model_report(*recording, a.refinements, a.seed);
+  const StopSignal stop(StopSignal::HangUp::stops);
+  StoppableProgress progress(stop, "modelling", kQuietWork);
+  const auto made = model_report(*recording, a.refinements, a.seed, [&](double done) { return progress.go_on(done); });
+  if (!made) return stopped_before({a.out, a.play});
+  const ModelReport& report = *made;
   std::string text = to_text(report);
   if (!a.out.empty()) {
     if (auto written = write_file(a.out, report.bytes); !written) return tl::unexpected(written.error());
@@ -68,8 +74,8 @@ void add_model_commands(CLI::App& app, std::function<Result<std::string>()>& cho
   CLI::App* command = app.add_subcommand(
       "model", "Model a recording by partials, noise and impacts, and print how near the model's sound comes to it");
   add_recording(*command, model->recording);
-  command->add_option("--out", model->out, "File for the model");
-  command->add_option("--play", model->play, "WAV file for the sound of the model");
+  command->add_option("--out", model->out, "File for the model")->check(given_name());
+  command->add_option("--play", model->play, "WAV file for the sound of the model")->check(given_name());
   command
       ->add_option("--refine", model->refinements,
                    "Rounds in which each peak is estimated again without the others; 0 is the fastest")
@@ -83,7 +89,7 @@ void add_model_commands(CLI::App& app, std::function<Result<std::string>()>& cho
   const auto again = std::make_shared<ResynthesiseArguments>();
   command = app.add_subcommand("resynthesise", "Make the sound of a model that the command model has written");
   command->add_option("MODEL", again->model, "File of a model")->required();
-  command->add_option("OUT", again->out, "WAV file for its sound, 16 bit, mono")->required();
+  command->add_option("OUT", again->out, "WAV file for its sound, 16 bit, mono")->required()->check(given_name());
   command->add_option("--seed", again->seed, "Of the phases and the noise: the same gives the same sound")
       ->check(whole_number())
       ->capture_default_str();

@@ -14,6 +14,8 @@
 #include "common/core/bounded_text.hpp"
 #include "common/runtime/files.hpp"
 #include "common/runtime/number_option.hpp"
+#include "common/runtime/stop_signal.hpp"
+#include "common/runtime/stoppable_progress.hpp"
 #include "common/tools/tool.hpp"
 #include "common/tools/tool_file.hpp"
 
@@ -61,7 +63,11 @@ Result<std::string> run_preset(const PresetArguments& a) {
                         .refinements = a.refinements};
   params.name = bounded_text(params.name.substr(0, 60));
   if (std::ranges::find(base->tools, a.tool) == base->tools.end()) params.tools = {a.tool};
-  auto made = recorded_preset(recording->samples, recording->rate_hz, *base, params);
+  const StopSignal stop(StopSignal::HangUp::stops);
+  StoppableProgress progress(stop, "modelling", kQuietWork);
+  auto made = recorded_preset(recording->samples, recording->rate_hz, *base, params,
+                              [&](double done) { return progress.go_on(done); });
+  if (!made && made.error().code == ErrorCode::cancelled) return stopped_before({a.out});
   if (!made) return failure(made.error().code, a.recording.file + ": " + made.error().message);
   const std::string yaml = to_yaml(made->model);
   if (auto written = write_file(a.out, yaml); !written) return tl::unexpected(written.error());
@@ -92,7 +98,7 @@ void add_preset_command(CLI::App& app, std::function<Result<std::string>()>& cho
   CLI::App* command =
       app.add_subcommand("preset", "Make a preset from a recording of a tool, to be played by osteon-audio --preset");
   add_recording(*command, a->recording);
-  command->add_option("--out", a->out, "File for the preset, YAML")->required();
+  command->add_option("--out", a->out, "File for the preset, YAML")->required()->check(given_name());
   command->add_option("--tool", a->tool, "The tool that was recorded: a kind such as drill or broach, or its name")
       ->capture_default_str();
   command

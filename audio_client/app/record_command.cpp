@@ -14,6 +14,7 @@
 #include <optional>
 
 #include "audio_client/app/output_file.hpp"
+#include "audio_client/app/recording_option.hpp"
 #include "audio_client/capture/level_meter.hpp"
 #include "audio_client/capture/sound_input.hpp"
 #include "common/runtime/number_option.hpp"
@@ -114,8 +115,9 @@ Result<std::string> run_record(RecordArguments a) {
   a.input.channels = static_cast<unsigned>(a.channels);
   auto input = SoundInput::open(a.input);
   if (!input) return tl::unexpected(input.error());
-  auto writer = sound::WavWriter::open(a.out, {.rate_hz = a.rate_hz, .channels = a.channels, .bits = a.bits},
-                                       sound::Unfinished::kept);
+  auto writer =
+      sound::WavWriter::open(a.out, {.rate_hz = a.rate_hz, .channels = a.channels, .bits = a.bits},
+                             sound::Unfinished::kept, a.overwrite ? sound::Older::replaced : sound::Older::kept);
   if (!writer) return tl::unexpected(writer.error());
   if (auto started = (*input)->start(); !started) return tl::unexpected(started.error());
 
@@ -151,7 +153,7 @@ void add_record_command(CLI::App& app, std::function<Result<std::string>()>& cho
   RecordArguments& a = *shared;
   CLI::App* command = app.add_subcommand(
       "record", "Record a microphone, or another source of PulseAudio, until Ctrl+C: a drilling, to analyse or model");
-  command->add_option("OUT", a.out, "WAV file for the sound, PCM")->required();
+  command->add_option("OUT", a.out, "WAV file for the sound, PCM")->required()->check(given_name());
   command->add_option("--seconds", a.seconds, "Length; without it, until Ctrl+C")->check(number_in(0.05, kLongest_s));
   command->add_option("--rate", a.rate_hz, "Samples in a second")
       ->check(CLI::Range(22050, 192000))

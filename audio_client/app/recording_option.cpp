@@ -15,6 +15,13 @@ CLI::Validator whole_number() {
           ""};
 }
 
+CLI::Validator given_name() {
+  return {[](const std::string& text) {
+            return text.empty() ? std::string("the name is empty; give a file") : std::string();
+          },
+          ""};
+}
+
 void add_recording(CLI::App& command, RecordingOption& recording) {
   command.add_option("FILE", recording.file, "WAV or RF64, PCM or float, 22050 to 384000 Hz, 0.25 s to 5 minutes")
       ->required();

@@ -18,6 +18,9 @@ struct RecordingOption {
 // A number without a sign, at most 2^64 - 1. CLI11 takes -1 for the largest one.
 [[nodiscard]] CLI::Validator whole_number();
 
+// A name of a file that is written: an empty one would only be noticed after the work.
+[[nodiscard]] CLI::Validator given_name();
+
 // Adds FILE, --channel, --from and --to. `recording` outlives `command`.
 void add_recording(CLI::App& command, RecordingOption& recording);
 

@@ -69,18 +69,17 @@ Result<void> check_size(const RenderArguments& a, const Space& space, double sec
   return bad_input(a.record + why.data());
 }
 
-// Refuses a record whose sound is too large before that is made, and finds what the listener looks at: the record does
-// not have the bone's bounds, of which the live listener looks at the middle.
-Result<void> read_ahead(const RenderArguments& a, Space& space, const StopSignal& stop) {
-  constexpr auto kMost = static_cast<double>(sound::WavWriter::kMostBytes);
-  if (space.listening == Listening::mono && bytes_of(a, space, kLongestSession_s) <= kMost) return {};
+// The length of the record. Refuses a record whose sound is too large before that is made, and finds what the listener
+// looks at: the record does not have the bone's bounds, of which the live listener looks at the middle.
+Result<double> read_ahead(const RenderArguments& a, Space& space, const StopSignal& stop) {
   auto states = open_states(a.record);
   if (!states) return tl::unexpected(states.error());
   StoppableProgress progress(stop, "reading the session");
   const auto recorded = survey(**states, [&](double done) { return progress.go_on(done); });
   if (!recorded) return tl::unexpected(recorded.error());
   move_to_middle(space, recorded->middle_mm);
-  return check_size(a, space, recorded->seconds);
+  if (auto fits = check_size(a, space, recorded->seconds); !fits) return tl::unexpected(fits.error());
+  return recorded->seconds;
 }
 
 Result<SynthParams> synth_params(const RenderArguments& a) {
@@ -102,7 +101,7 @@ Result<SynthParams> synth_params(const RenderArguments& a) {
 
 // Writes one channel in mono, and two otherwise.
 Result<OfflineSound> write_sound(StateRecord& record, const SynthParams& params, sound::WavWriter& writer,
-                                 const StopSignal& stop) {
+                                 const StopSignal& stop, double record_s) {
   const bool mono = params.space.listening == Listening::mono;
   std::vector<float> both;
   const auto take = [&](std::span<const float> left, std::span<const float> right) -> Result<void> {
@@ -112,7 +111,8 @@ Result<OfflineSound> write_sound(StateRecord& record, const SynthParams& params,
     return writer.write(both);
   };
   StoppableProgress progress(stop, "making the sound");
-  return render_states(record, params, take, [&](double done) { return progress.go_on(done); });
+  return render_states(
+      record, params, take, [&](double done) { return progress.go_on(done); }, record_s);
 }
 
 Result<std::string> run_render(const RenderArguments& a) {
@@ -131,8 +131,8 @@ Result<std::string> run_render(const RenderArguments& a) {
   const StopSignal stop(StopSignal::HangUp::stops);
   const auto begin = std::chrono::steady_clock::now();
   const auto looked = read_ahead(a, params->space, stop);
-  const Result<OfflineSound> sound =
-      looked ? write_sound(**record, *params, *writer, stop) : Result<OfflineSound>(tl::unexpected(looked.error()));
+  const Result<OfflineSound> sound = looked ? write_sound(**record, *params, *writer, stop, *looked)
+                                            : Result<OfflineSound>(tl::unexpected(looked.error()));
   if (!sound && sound.error().code == ErrorCode::cancelled)
     return failure(ErrorCode::cancelled, "stopped; " + a.out + " was not written");
   if (!sound) return tl::unexpected(sound.error());
@@ -151,7 +151,8 @@ void add_render_command(CLI::App& app, std::function<Result<std::string>()>& cho
   command->add_option("RECORD", a.record, "What osteon-haptic --record (session.h5) or --session-log (CSV) wrote")
       ->required();
   command->add_option("--out", a.out, "WAV file for the sound, PCM: both channels, or one with --listen mono")
-      ->required();
+      ->required()
+      ->check(given_name());
   add_listening(*command, a.listening, "the work in bone");
   command->add_option("--rate", a.rate_hz, "Samples in a second; the live sound has 48000")
       ->check(CLI::Range(22050, 192000))

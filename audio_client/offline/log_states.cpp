@@ -60,6 +60,12 @@ class LogStates final : public StateRecord {
     for (const std::span<Column> columns :
          {std::span<Column>(optional_), std::span<Column>(tip_), std::span<Column>(axis_)})
       for (Column& column : columns) column.at = find(column.name);
+    for (const std::span<const Column> columns : {std::span<const Column>(needed_), std::span<const Column>(optional_),
+                                                  std::span<const Column>(tip_), std::span<const Column>(axis_)})
+      for (const Column& column : columns)
+        if (std::ranges::count(columns_, std::string_view(column.name)) > 1)
+          return bad_input(file_ + ": line 1 has the column " + column.name +
+                           " more than once; keep the one that the sound shall follow");
     return {};
   }
 

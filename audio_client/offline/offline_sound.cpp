@@ -80,13 +80,18 @@ class Player {
 }  // namespace
 
 Result<OfflineSound> render_states(StateRecord& record, const SynthParams& params, const TakeFrames& take,
-                                   const KeepGoing& keep_going) {
+                                   const KeepGoing& keep_going, std::optional<double> record_s) {
   OfflineSound sound;
+  const auto done = [&] {
+    if (!record_s) return record.done();
+    const double sound_s = static_cast<double>(sound.frames) / params.rate_hz;
+    return std::min(1.0, sound_s / (*record_s + kLongestTail_s));
+  };
   Player player(record, params);
   if (auto begun = player.begin(); !begun) return tl::unexpected(begun.error());
   std::vector<float> left(OutputParams{}.frames), right(left.size());
   for (int count = 0;; ++count) {
-    if (count % kBuffersPerReport == 0 && !keep_going(record.done())) return stopped_while("making the sound");
+    if (count % kBuffersPerReport == 0 && !keep_going(done())) return stopped_while("making the sound");
     const auto more = player.fill(left, right, sound);
     if (!more) return tl::unexpected(more.error());
     if (!*more) return sound;

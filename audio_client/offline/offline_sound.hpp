@@ -2,6 +2,7 @@
 #pragma once
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <span>
 
 #include "audio_client/offline/state_record.hpp"
@@ -19,14 +20,15 @@ struct OfflineSound {
 // Takes the next frames of both channels, in order. In mono both are equal.
 using TakeFrames = std::function<Result<void>(std::span<const float> left, std::span<const float> right)>;
 
-// The sound begins with the first state. Every buffer of the live client's size takes the states that are there when
-// the buffer begins, and continues them to then. Where no state comes for 2 s, and at the end, the tool runs down as it
-// does live. Errors: those of the record and of `take`, and cancelled.
-[[nodiscard]] Result<OfflineSound> render_states(StateRecord& record, const SynthParams& params, const TakeFrames& take,
-                                                 const KeepGoing& keep_going);
-
 // By so much the sound is longer than its record: the tool runs down, and a buffer is filled.
 inline constexpr double kLongestTail_s = 2.1;
+
+// The sound begins with the first state. Every buffer of the live client's size takes the states that are there when
+// the buffer begins, and continues them to then. Where no state comes for 2 s, and at the end, the tool runs down as it
+// does live. `record_s`: as in RecordedWork, if it is known. Then the progress is that of the sound's time, otherwise
+// of the reading. Errors: those of the record and of `take`, and cancelled.
+[[nodiscard]] Result<OfflineSound> render_states(StateRecord& record, const SynthParams& params, const TakeFrames& take,
+                                                 const KeepGoing& keep_going, std::optional<double> record_s = {});
 
 struct RecordedWork {
   Vec3 middle_mm = Vec3::Zero();  // the mean place of the tip while it touched bone; if it never did, of all states

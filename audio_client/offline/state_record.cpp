@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cmath>
+#include <cstdio>
 #include <fstream>
 #include <string_view>
 
@@ -40,6 +41,13 @@ std::optional<NamedNumber> impossible(const CuttingState& state) {
   return std::nullopt;
 }
 
+// A wild number has up to 300 digits before its point.
+std::string shown(double value) {
+  std::array<char, 32> text{};
+  std::snprintf(text.data(), text.size(), "%.6g", value);
+  return text.data();
+}
+
 }  // namespace
 
 void StateRecord::note_tool(const std::string& name) {
@@ -56,7 +64,7 @@ Result<std::optional<CuttingState>> StateRecord::next() {
   auto state = read();
   if (!state || !*state) return state;
   if (const auto number = impossible(**state))
-    return bad_input(place(number->field) + "is " + std::to_string(number->value) +
+    return bad_input(place(number->field) + "is " + shown(number->value) +
                      ", which no tool has; the record is damaged, so record the session again");
   const std::int64_t time_ns = (*state)->time_ns;
   if (time_ns < 0 || time_ns > kLatestState_ns)

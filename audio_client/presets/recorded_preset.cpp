@@ -203,7 +203,8 @@ void learn_material(Material& material, const ToolModel& model, const sound::Spe
   material.noise_db = std::clamp(applied_change(noise_db), -60.0, 60.0);
 }
 
-Result<RecordedPreset> turning(std::span<const float> x, const ToolModel& base, const RecordedParams& params) {
+Result<RecordedPreset> turning(std::span<const float> x, const ToolModel& base, const RecordedParams& params,
+                               const KeepGoing& keep_going) {
   RecordedPreset made{.model = base, .text = {}};
   ToolModel& model = made.model;
   const double rpm = params.rpm > 0 ? params.rpm : base.rated_rpm;
@@ -218,7 +219,9 @@ Result<RecordedPreset> turning(std::span<const float> x, const ToolModel& base, 
         "nearer to the tool");
   sound::SpectralParams spectral;
   spectral.partials.peaks.refinements = params.refinements;
-  const sound::SpectralAnalysis analysis = sound::spectral_analysis(x, kRate_hz, spectral);
+  const auto analysed = sound::spectral_analysis(x, kRate_hz, spectral, keep_going);
+  if (!analysed) return tl::unexpected(analysed.error());
+  const sound::SpectralAnalysis& analysis = *analysed;
   const std::vector<FoundPeak> found = lines_of(part_of(analysis.kept_sines, *free));
   const std::vector<SourceOrder> orders = source_orders(base);
   model.rated_rpm = base.geared ? fitted_rpm(found, orders, rpm) : rpm;
@@ -270,11 +273,14 @@ int ringing_of(std::span<const float> x, const std::vector<std::size_t>& impacts
   return blows;
 }
 
-Result<RecordedPreset> struck(std::span<const float> x, const ToolModel& base, const RecordedParams& params) {
+Result<RecordedPreset> struck(std::span<const float> x, const ToolModel& base, const RecordedParams& params,
+                              const KeepGoing& keep_going) {
   RecordedPreset made{.model = base, .text = {}};
   sound::SpectralParams spectral;
   spectral.partials.peaks.refinements = params.refinements;
-  const sound::SpectralAnalysis analysis = sound::spectral_analysis(x, kRate_hz, spectral);
+  const auto analysed = sound::spectral_analysis(x, kRate_hz, spectral, keep_going);
+  if (!analysed) return tl::unexpected(analysed.error());
+  const sound::SpectralAnalysis& analysis = *analysed;
   sound::Spectrum early, late;
   const int blows = ringing_of(x, analysis.impacts, early, late);
   if (blows == 0)
@@ -297,6 +303,9 @@ Result<RecordedPreset> struck(std::span<const float> x, const ToolModel& base, c
     blow.modes.push_back({peak.hz, decay_s, std::min(0.0, peak.level_db + sound::power_db(2.0 / blows) + then_db)});
   }
   made.text += said("blows      %zu\nmodes      %zu\n", analysis.impacts.size(), blow.modes.size());
+  if (blow.modes.empty())
+    made.text +=
+        "note       nothing rings after the blows, so the preset has little to sound; is it the right --tool?\n";
   for (const sound::Transient& transient : analysis.model.transients)
     if (made.model.transients.size() < kMostTransients) made.model.transients.push_back(transient.samples);
   if (!made.model.transients.empty()) blow.click_db = 0.0;  // as recorded
@@ -306,7 +315,7 @@ Result<RecordedPreset> struck(std::span<const float> x, const ToolModel& base, c
 }  // namespace
 
 Result<RecordedPreset> recorded_preset(std::span<const float> samples, int rate_hz, const ToolModel& base,
-                                       const RecordedParams& params) {
+                                       const RecordedParams& params, const KeepGoing& keep_going) {
   const std::vector<float> x = sound::resampled(samples, rate_hz, kRate_hz);
   ToolModel start = base;
   start.name = params.name;
@@ -314,7 +323,7 @@ Result<RecordedPreset> recorded_preset(std::span<const float> samples, int rate_
   if (!params.tools.empty()) start.tools = params.tools;
   start.recorded_s = static_cast<double>(x.size()) / kRate_hz;
   start.transients.clear();
-  auto made = base.drive == Drive::blows ? struck(x, start, params) : turning(x, start, params);
+  auto made = base.drive == Drive::blows ? struck(x, start, params, keep_going) : turning(x, start, params, keep_going);
   if (!made) return made;
   std::size_t stored = 0;
   for (const std::vector<float>& transient : made->model.transients) stored += transient.size();

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "audio_client/presets/tool_model.hpp"
+#include "common/core/keep_going.hpp"
 #include "common/core/result.hpp"
 
 namespace osteon::audio {
@@ -25,8 +26,9 @@ struct RecordedPreset {
 // A tool that turns: the longest part that runs free gives lines and noise. Parts in cancellous and cortical bone, if
 // there are any, give the changes of each source, with the threshold of 3 dB. A tool that is struck: the ringing after
 // the blows gives the modes, and the blows themselves are kept, at most 20 ms each and a tenth of the recording.
-// Error: invalid_input if nothing runs, or nothing strikes.
-[[nodiscard]] Result<RecordedPreset> recorded_preset(std::span<const float> samples, int rate_hz, const ToolModel& base,
-                                                     const RecordedParams& params);
+// Errors: invalid_input if nothing runs, or nothing strikes; cancelled.
+[[nodiscard]] Result<RecordedPreset> recorded_preset(
+    std::span<const float> samples, int rate_hz, const ToolModel& base, const RecordedParams& params,
+    const KeepGoing& keep_going = [](double) { return true; });
 
 }  // namespace osteon::audio

@@ -41,7 +41,9 @@ bool RecordingReader::open_file() {
   file_ = Hdf5Handle(H5Fopen(path_.c_str(), H5F_ACC_RDONLY | H5F_ACC_SWMR_READ, access.id()), H5Fclose);
   if (!file_.ok()) file_ = Hdf5Handle(H5Fopen(path_.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT), H5Fclose);
   if (!file_.ok())
-    return wrong(ErrorCode::invalid_input, name_ + " cannot be opened: it is damaged, or another program has it open");
+    return wrong(ErrorCode::invalid_input, name_ +
+                                               " cannot be opened: it is damaged, or another program has it open; "
+                                               "close that program, or give another recording");
   return true;
 }
 

@@ -82,10 +82,17 @@ std::optional<int> parse_arguments(CLI::App& app, int argc, const char* const* a
     app.parse(argc, argv);
     return std::nullopt;
   } catch (const CLI::ParseError& error) {
+    // A command has a help of its own.
+    const CLI::App* given = &app;
+    std::string path = app.get_name();
+    while (!given->get_subcommands().empty()) {
+      given = given->get_subcommands().front();
+      path += " " + given->get_name();
+    }
     // The library treats help as an "error" of code 0.
     if (error.get_exit_code() == 0) return app.exit(error);
-    return log::exit_with(
-        app.get_name(), {ErrorCode::invalid_input, std::string(error.what()) + "; see " + app.get_name() + " --help"});
+    return log::exit_with(app.get_name(),
+                          {ErrorCode::invalid_input, std::string(error.what()) + "; see " + path + " --help"});
   }
 }
 

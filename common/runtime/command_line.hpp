@@ -14,7 +14,8 @@ namespace osteon {
 inline constexpr std::size_t kHelpColumns = 100;  // widest line of a help text, characters
 
 // Parses the arguments into what `app` was given, which has --help and --version afterwards. Returns an exit code where
-// main must return at once: 0 after it has printed the help or the version, 1 after one sentence on what is wrong. From
+// main must return at once: 0 after it has printed the help or the version, 1 after one sentence on what is wrong, with
+// the command whose help says more. From
 // then on a file beyond the shell's limit (ulimit -f) is an error of its write, and no signal ends the program.
 [[nodiscard]] std::optional<int> parse_arguments(CLI::App& app, int argc, const char* const* argv);
 

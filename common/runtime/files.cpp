@@ -29,7 +29,10 @@ Result<void> write_file(const std::filesystem::path& file, std::string_view cont
     std::ofstream out(partial, std::ios::binary | std::ios::trunc);
     out.write(content.data(), static_cast<std::streamsize>(content.size()));
     out.flush();
-    if (!out) return give_up(std::strerror(errno));
+    const int reason = errno;
+    if (!out)
+      return give_up(std::strerror(reason) +
+                     std::string(reason == ENOSPC ? "; make room on the disk, or choose another one" : ""));
   }
   std::error_code error;
   std::filesystem::rename(partial, target, error);

@@ -15,6 +15,7 @@ namespace {
 
 using std::numbers::pi;
 
+constexpr std::size_t kFramesPerReport = 64;
 constexpr std::size_t kShortestFrame = 32;
 
 struct Pair {
@@ -33,12 +34,14 @@ std::optional<std::size_t> cut_between(std::size_t from, std::size_t to, std::sp
 }  // namespace
 
 std::vector<std::vector<Sinusoid>> frame_peaks(std::span<const float> samples, double rate_hz,
-                                               const PartialParams& params, std::span<const std::size_t> cuts) {
+                                               const PartialParams& params, std::span<const std::size_t> cuts,
+                                               const KeepGoing& keep_going) {
   OSTEON_CHECK(params.window >= 32 && params.window % 2 == 0 && params.hop >= 1);
   const auto window = static_cast<std::size_t>(params.window), hop = static_cast<std::size_t>(params.hop);
   std::map<std::size_t, PeakFinder> finders;  // by the samples of their frames
   std::vector<std::vector<Sinusoid>> frames(samples.size() / hop + 1);
   for (std::size_t m = 0; m < frames.size(); ++m) {
+    if (m % kFramesPerReport == 0 && !keep_going(static_cast<double>(m) / static_cast<double>(frames.size()))) break;
     const std::size_t middle = m * hop;
     std::size_t end = samples.size();  // of what the frame may see
     for (const std::size_t cut : cuts)

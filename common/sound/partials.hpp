@@ -4,6 +4,7 @@
 #include <span>
 #include <vector>
 
+#include "common/core/keep_going.hpp"
 #include "common/sound/spectral_peaks.hpp"
 
 namespace osteon::sound {
@@ -26,10 +27,11 @@ struct Partial {
 // The peaks of the frames 0 ... samples / hop, whose middles are at the samples m * hop. `cuts` are samples at which
 // something new begins, such as ringing after an impact: a frame with its middle before a cut sees nothing beyond it. A
 // frame that would reach beyond a cut or the signal is moved to the side, and its phases are carried to its middle by
-// their frequencies. Where too little is left for that, the frame is shorter, and below 32 samples it has no peaks.
-[[nodiscard]] std::vector<std::vector<Sinusoid>> frame_peaks(std::span<const float> samples, double rate_hz,
-                                                             const PartialParams& params,
-                                                             std::span<const std::size_t> cuts = {});
+// their frequencies. Where too little is left for that, the frame is shorter, and below 32 samples it has no peaks. If
+// `keep_going` stops the work, the frames that were not reached have no peaks.
+[[nodiscard]] std::vector<std::vector<Sinusoid>> frame_peaks(
+    std::span<const float> samples, double rate_hz, const PartialParams& params, std::span<const std::size_t> cuts = {},
+    const KeepGoing& keep_going = [](double) { return true; });
 
 // Peak continuation: from frame to frame, the closest pair of a partial and a peak is joined first, then the next
 // closest, within the step. A partial without a peak dies, and a peak without a partial is born. Short partials are

@@ -42,11 +42,20 @@ std::vector<NoiseModel> noise_layers(std::vector<float> rest, const SpectralAnal
 }  // namespace
 
 SpectralAnalysis spectral_analysis(std::span<const float> samples, double rate_hz, const SpectralParams& params) {
+  return *spectral_analysis(samples, rate_hz, params, [](double) { return true; });
+}
+
+Result<SpectralAnalysis> spectral_analysis(std::span<const float> samples, double rate_hz, const SpectralParams& params,
+                                           const KeepGoing& keep_going) {
   OSTEON_CHECK(rate_hz > 0);
+  bool goes_on = true;
+  const KeepGoing watched = [&](double done) { return goes_on = goes_on && keep_going(done); };
   SpectralAnalysis a;
   a.impacts = impacts(samples, rate_hz, params.transients);
-  a.partials =
-      continued(frame_peaks(samples, rate_hz, params.partials, a.impacts), rate_hz, params.partials, a.impacts);
+  // The peaks take most of the time.
+  const auto peaks = frame_peaks(samples, rate_hz, params.partials, a.impacts, part(watched, 0.0, 0.8));
+  if (!watched(0.8)) return stopped_while("modelling the sound");
+  a.partials = continued(peaks, rate_hz, params.partials, a.impacts);
   a.sines = sound_with_phases(a.partials, rate_hz, params.partials.hop, samples.size(), a.impacts);
   a.residual.assign(samples.begin(), samples.end());
   for (std::size_t i = 0; i < samples.size(); ++i) a.residual[i] -= a.sines[i];
@@ -64,6 +73,7 @@ SpectralAnalysis spectral_analysis(std::span<const float> samples, double rate_h
     else
       a.model.partials.push_back(knots_of(partial, params.tolerance));
   }
+  if (!watched(0.9)) return stopped_while("modelling the sound");
   const std::vector<float> short_sines =
       sound_with_phases(others, rate_hz, params.partials.hop, samples.size(), a.impacts);
   a.kept_sines = a.sines;

@@ -5,6 +5,8 @@
 #include <span>
 #include <vector>
 
+#include "common/core/keep_going.hpp"
+#include "common/core/result.hpp"
 #include "common/sound/line_segments.hpp"
 #include "common/sound/noise_model.hpp"
 #include "common/sound/partials.hpp"
@@ -46,6 +48,9 @@ struct SpectralAnalysis {
 
 [[nodiscard]] SpectralAnalysis spectral_analysis(std::span<const float> samples, double rate_hz,
                                                  const SpectralParams& params = {});
+// The same; minutes of sound take a while. Error cancelled: `keep_going` stopped it.
+[[nodiscard]] Result<SpectralAnalysis> spectral_analysis(std::span<const float> samples, double rate_hz,
+                                                         const SpectralParams& params, const KeepGoing& keep_going);
 
 // s(t) = sum over the partials of A(t) cos(theta(t)) + e(t) (8.21 to 8.23): oscillators, whose phases begin at random,
 // noise, and the impacts in place of both. The same seed gives the same sound.

@@ -265,8 +265,10 @@ Result<WavSound> read_wav(const fs::path& file, const WavPart& part) {
   MendedFile mended;
   const SoundFile in(open_sound(file, *chunks, mended, info));
   if (!in)
-    return bad_input("cannot read " + file.string() + ": " + sf_strerror(nullptr) +
-                     "; convert it to PCM WAV of 16 bits");
+    return bad_input(
+        "cannot read " + file.string() +
+        ": its chunk \"fmt \" is damaged, or of a kind that Osteon does not know; convert it to PCM WAV of "
+        "16 bits");
   const Result<SampleFormat> format = format_of(file, info.format);
   if (!format) return tl::unexpected(format.error());
   // Whatever the header says, no more is there.

@@ -1,10 +1,12 @@
 #include "common/sound/wav_writer.hpp"
 
+#include <fcntl.h>
 #include <sndfile.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <cerrno>
+#include <cstdio>
 #include <string>
 #include <system_error>
 #include <utility>
@@ -24,12 +26,21 @@ std::error_code reason() {
                     : std::make_error_code(std::errc::no_space_on_device);
 }
 
+// Renames, but replaces nothing.
+std::error_code rename_to_new(const fs::path& from, const fs::path& to) {
+  bool named = ::renameat2(AT_FDCWD, from.c_str(), AT_FDCWD, to.c_str(), RENAME_NOREPLACE) == 0;
+  // Some file systems have only the older way to avoid replacing a file.
+  if (!named && errno == EINVAL) named = ::link(from.c_str(), to.c_str()) == 0 && ::unlink(from.c_str()) == 0;
+  return named ? std::error_code() : std::error_code(errno, std::generic_category());
+}
+
 }  // namespace
 
 struct WavWriter::Impl {
   fs::path file, target, partial;
   WavFormat format;
   Unfinished unfinished = Unfinished::removed;
+  Older older = Older::replaced;
   SNDFILE* out = nullptr;
   std::uint64_t frames = 0;
   std::error_code first_error;
@@ -44,7 +55,9 @@ struct WavWriter::Impl {
   Result<void> end();  // writes the header, and closes the file
 
   [[nodiscard]] std::string not_whole(const std::error_code& why) const {
-    return "the sound " + file.string() + " could not be written whole (" + why.message() + ")";
+    const bool full = why == std::errc::no_space_on_device;
+    return "the sound " + file.string() + " could not be written whole (" + why.message() +
+           (full ? "; make room on the disk)" : ")");
   }
   [[nodiscard]] tl::unexpected<Error> not_written(const std::error_code& why) {
     failed = true;
@@ -77,7 +90,7 @@ WavWriter::~WavWriter() = default;
 WavWriter::WavWriter(WavWriter&&) noexcept = default;
 WavWriter& WavWriter::operator=(WavWriter&&) noexcept = default;
 
-Result<WavWriter> WavWriter::open(const fs::path& file, const WavFormat& format, Unfinished unfinished) {
+Result<WavWriter> WavWriter::open(const fs::path& file, const WavFormat& format, Unfinished unfinished, Older older) {
   OSTEON_CHECK(format.channels > 0 && (format.bits == 16 || format.bits == 24));
   std::error_code error;
   // A rename would replace a link, a device or a pipe by a file.
@@ -91,13 +104,15 @@ Result<WavWriter> WavWriter::open(const fs::path& file, const WavFormat& format,
   impl->partial += ".partial-" + std::to_string(::getpid());
   impl->format = format;
   impl->unfinished = unfinished;
+  impl->older = older;
   SF_INFO info{};
   info.samplerate = format.rate_hz;
   info.channels = format.channels;
   info.format = SF_FORMAT_WAV | (format.bits == 16 ? SF_FORMAT_PCM_16 : SF_FORMAT_PCM_24);
+  errno = 0;
   impl->out = sf_open(impl->partial.c_str(), SFM_WRITE, &info);
   if (!impl->out)
-    return failure(ErrorCode::internal, "cannot write the sound " + file.string() + ": " + sf_strerror(nullptr) +
+    return failure(ErrorCode::internal, "cannot write the sound " + file.string() + ": " + reason().message() +
                                             "; choose a place where you may write");
   sf_command(impl->out, SFC_SET_CLIPPING, nullptr, SF_TRUE);
   return WavWriter(std::move(impl));
@@ -125,7 +140,16 @@ void WavWriter::update_header() { sf_command(impl_->out, SFC_UPDATE_HEADER_NOW, 
 Result<void> WavWriter::close() {
   if (auto ended = impl_->end(); !ended) return ended;
   std::error_code error;
-  fs::rename(impl_->partial, impl_->target, error);
+  if (impl_->older == Older::kept)
+    error = rename_to_new(impl_->partial, impl_->target);
+  else
+    fs::rename(impl_->partial, impl_->target, error);
+  if (error == std::errc::file_exists) {
+    impl_->left = true;
+    return failure(ErrorCode::exists, "another program made " + impl_->file.string() +
+                                          " meanwhile, and it is as that program left it; " + impl_->partial.string() +
+                                          " has the sound, so give it another name");
+  }
   if (error) return impl_->not_closed(error);
   return {};
 }

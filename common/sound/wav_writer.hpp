@@ -21,6 +21,12 @@ enum class Unfinished : std::uint8_t {
   kept,     // it cannot
 };
 
+// What becomes of another file that has the name when the sound is whole.
+enum class Older : std::uint8_t {
+  replaced,
+  kept,
+};
+
 class WavWriter {
  public:
   // The size in a header has 32 bits.
@@ -28,7 +34,8 @@ class WavWriter {
 
   // Begins FILE.partial-PID beside the file. Error internal: it cannot be made; names the file.
   [[nodiscard]] static Result<WavWriter> open(const std::filesystem::path& file, const WavFormat& format,
-                                              Unfinished unfinished = Unfinished::removed);
+                                              Unfinished unfinished = Unfinished::removed,
+                                              Older older = Older::replaced);
   ~WavWriter();  // without close(): removes what was begun; an older file of that name is as it was
   WavWriter(WavWriter&&) noexcept;
   WavWriter& operator=(WavWriter&&) noexcept;
@@ -40,7 +47,8 @@ class WavWriter {
   void update_header();
   // Renames the file. With Unfinished::kept, also after an error of write(): it then has the frames that were taken.
   // Error internal: it could not be written whole, or not be renamed. What is kept then stays in FILE.partial-PID,
-  // which the sentence names.
+  // which the sentence names. Error exists: with Older::kept another file has the name; the sound stays in
+  // FILE.partial-PID.
   [[nodiscard]] Result<void> close();
   // As close(), but the file keeps its name FILE.partial-PID, which is returned: a file that is already there stays.
   [[nodiscard]] Result<std::filesystem::path> close_apart();

@@ -122,7 +122,8 @@ class Session:
 
     def _start_audio(self, address):
         command = [self.programs / "osteon-audio", "--server", address, "--plain", "--wav", self.out / "sound.wav",
-                   "--state-log", self.out / "states.csv", "--summary", self.out / "audio.json", "--output", "pulse"]
+                   "--overwrite", "--state-log", self.out / "states.csv", "--summary", self.out / "audio.json",
+                   "--output", "pulse"]
         if has_sound_server():
             self.say("Sound: your sound server.")
         else:

@@ -447,7 +447,7 @@ TEST_F(AnalyseProgram, ASignalLeavesTheWholeFolderOrNone) {
       continue;
     }
     EXPECT_EQ(code, 130) << signal;
-    EXPECT_EQ(audio.err(), "osteon-audio: stopped; " + out.string() + " was not written\n");
+    EXPECT_THAT(audio.err(), testing::EndsWith("osteon-audio: stopped; " + out.string() + " was not written\n"));
   }
 }
 
@@ -561,21 +561,70 @@ TEST_F(AnalyseProgram, WhatIsThereOfACutRecordingIsAnalysed) {
   EXPECT_THAT(said(whole), testing::Not(testing::HasSubstr("note")));
 }
 
-TEST_F(AnalyseProgram, WrongUseIsOneSentenceEach) {
-  const auto put = [&](const char* name, std::string_view text) {
+TEST(Analysis, GoesOnInPartsUntilItIsStopped) {
+  const sound::WavSound recording{.rate_hz = kAnalysisRate_hz, .samples = noise_with(0.1, {}, 1.0)};
+  std::vector<double> done;
+  const auto whole = analyse(recording, {}, [&](double fraction) {
+    done.push_back(fraction);
+    return true;
+  });
+  ASSERT_TRUE(whole) << whole.error().message;
+  EXPECT_TRUE(std::ranges::is_sorted(done));
+  EXPECT_GE(done.size(), 5U);
+  EXPECT_DOUBLE_EQ(done.back(), 1.0);
+  int calls = 0;
+  const auto stopped = analyse(recording, {}, [&](double) { return ++calls < 3; });
+  ASSERT_FALSE(stopped);
+  EXPECT_EQ(stopped.error().code, ErrorCode::cancelled);
+  EXPECT_EQ(calls, 3) << "it ends there";
+}
+
+// The longest recording, with tables and pictures: they take seconds.
+TEST_F(AnalyseProgram, AStopIsOneSentenceAndWritesNothing) {
+  const fs::path file = temp_ / "long.wav";
+  ASSERT_TRUE(sound::write_wav(file, sound::white_noise(0.1, 96000 * 299, 1), 96000));
+  test::Process audio(test::program("osteon-audio"), {"analyse", file.string(), "--out", (temp_ / "out").string()});
+  ASSERT_TRUE(
+      test::wait_until([&] { return audio.err().find("analysing: ") != std::string::npos; }, std::chrono::seconds(60)))
+      << audio.err();
+  audio.signal(SIGINT);
+  EXPECT_EQ(audio.wait(std::chrono::seconds(60)), 130);
+  EXPECT_THAT(audio.err(),
+              testing::HasSubstr("osteon-audio: stopped; " + (temp_ / "out").string() + " was not written"));
+  EXPECT_EQ(audio.out(), "");
+  EXPECT_FALSE(fs::exists(temp_ / "out"));
+}
+
+// Wrong use of the program, and what its one sentence says.
+class AnalyseWrongUse : public AnalyseProgram {
+ protected:
+  struct Wrong {
+    std::vector<std::string> arguments;
+    std::vector<std::string> says;
+  };
+  [[nodiscard]] std::string put(const char* name, std::string_view text) const {
     std::ofstream(temp_ / name, std::ios::binary) << text;
     return (temp_ / name).string();
-  };
+  }
+  void expect_one_sentence_each(const std::vector<Wrong>& cases) const {
+    for (const Wrong& wrong : cases) {
+      const test::RunResult result = analyse_with(wrong.arguments);
+      EXPECT_EQ(result.exit_code, 1) << wrong.says.front();
+      EXPECT_THAT(result.err, testing::StartsWith("osteon-audio: "));
+      for (const std::string& words : wrong.says) EXPECT_THAT(result.err, testing::HasSubstr(words));
+      EXPECT_EQ(std::ranges::count(result.err, '\n'), 1) << result.err;
+      EXPECT_EQ(result.out, "");
+    }
+  }
+};
+
+TEST_F(AnalyseWrongUse, IsOneSentenceEach) {
   const std::string whole = test::content(wav());
   const std::string drilling = wav().string();
   std::string stereo = whole, slow = whole;
   stereo[22] = 2, stereo[32] = 4;                  // NumChannels, BlockAlign
   slow[24] = 0x40, slow[25] = 0x1F, slow[26] = 0;  // SampleRate 8000
   const std::string table = put("late.csv", "time_s,depth_mm\n100,2\n110,3\n");
-  struct Wrong {
-    std::vector<std::string> arguments;
-    std::vector<std::string> says;
-  };
   const std::vector<Wrong> cases = {
       {{"nothing.wav"}, {"nothing.wav", "give the path"}},
       {{}, {"FILE"}},
@@ -586,6 +635,9 @@ TEST_F(AnalyseProgram, WrongUseIsOneSentenceEach) {
       {{put("slow.wav", slow)}, {"slow.wav", "SampleRate is 8000", "44100"}},
       {{temp_.path().string()}, {"folder"}},
       {{drilling, "--out", "/proc/nowhere/out"}, {"/proc/nowhere/out", "may write"}},
+      {{drilling, "--out", (temp_ / "no/folder").string()}, {"no/folder", "--out", "a folder that exists"}},
+      {{drilling, "--out", (temp_ / "no/folder/").string()}, {"no/folder/", "--out", "a folder that exists"}},
+      {{drilling, "--out", ""}, {"--out: the name is empty", "osteon-audio analyse --help"}},
       {{drilling, "--out", drilling}, {"drilling.wav", "already there"}},
       {{drilling, "--channel", "middle"}, {"--channel", "middle"}},
       {{drilling, "--rpm", "0"}, {"--rpm"}},
@@ -601,6 +653,16 @@ TEST_F(AnalyseProgram, WrongUseIsOneSentenceEach) {
       {{drilling, "--from", "3", "--to", "3.1"}, {"drilling.wav", "the part lasts 0.1 s"}},
       {{drilling, "--displacement", table}, {"--displacement", "--out"}},
       {{drilling, "--displacement-start", "1"}, {"--displacement-start", "--displacement"}},
+  };
+  expect_one_sentence_each(cases);
+  EXPECT_FALSE(fs::exists(temp_ / "out"));
+  EXPECT_FALSE(fs::exists(temp_ / "no"));
+}
+
+TEST_F(AnalyseWrongUse, OfATableIsOneSentenceEach) {
+  const std::string drilling = wav().string();
+  const std::string table = put("late.csv", "time_s,depth_mm\n100,2\n110,3\n");
+  const std::vector<Wrong> cases = {
       {{drilling, "--out", (temp_ / "out").string(), "--displacement", table},
        {"late.csv", "100 to 110 s", "--displacement-start"}},
       {{drilling, "--out", (temp_ / "out").string(), "--displacement", temp_.path().string()}, {"folder"}},
@@ -621,16 +683,11 @@ TEST_F(AnalyseProgram, WrongUseIsOneSentenceEach) {
        {"h.csv: line 2 has 4 fields, and line 1 has 2", "with a point"}},
       {{drilling, "--out", (temp_ / "out").string(), "--displacement", put("i.csv", "time_s;depth_mm\n0;1\n")},
        {"i.csv", "separated by a comma"}},
+      {{drilling, "--out", (temp_ / "out").string(), "--displacement", put("j.csv", "time_s,depth_mm,time_s\n0,1,2\n")},
+       {"j.csv: line 1 has the column time_s more than once"}},
       {{drilling, "--out", (temp_ / "out").string(), "--displacement", put("g.csv", "")}, {"g.csv", "time_s"}},
   };
-  for (const Wrong& wrong : cases) {
-    const test::RunResult result = analyse_with(wrong.arguments);
-    EXPECT_EQ(result.exit_code, 1) << wrong.says.front();
-    EXPECT_THAT(result.err, testing::StartsWith("osteon-audio: "));
-    for (const std::string& words : wrong.says) EXPECT_THAT(result.err, testing::HasSubstr(words));
-    EXPECT_EQ(std::ranges::count(result.err, '\n'), 1) << result.err;
-    EXPECT_EQ(result.out, "");
-  }
+  expect_one_sentence_each(cases);
   EXPECT_FALSE(fs::exists(temp_ / "out"));
 }
 

@@ -126,6 +126,21 @@ TEST_F(RecordCommand, NeverLosesAFileThatIsThere) {
   EXPECT_EQ(*read_file(file()), "an operation that nobody can repeat");
 }
 
+// Of two recorders on one new name, both keep what they heard.
+TEST_F(RecordCommand, NeverLosesAFileThatCameMeanwhile) {
+  test::Process audio(test::program("osteon-audio"), {"record", file(), "--seconds", "2"});
+  const auto partial = temp_ / ("x.wav.partial-" + std::to_string(audio.pid()));
+  ASSERT_TRUE(test::wait_until([&] { return std::filesystem::exists(partial); }, 30s)) << audio.err();
+  ASSERT_TRUE(write_file(file(), "an operation that nobody can repeat"));
+  EXPECT_EQ(audio.wait(60s), 1);
+  EXPECT_THAT(audio.err(),
+              AllOf(HasSubstr("another program made " + file()), HasSubstr(partial.string() + " has the sound")));
+  EXPECT_EQ(*read_file(file()), "an operation that nobody can repeat");
+  const auto sound = sound::read_wav(partial);
+  ASSERT_TRUE(sound) << sound.error().message;
+  EXPECT_NEAR(sound->seconds(), 2.0, 0.001);
+}
+
 // A file that is not there cannot be lost: what came until the disk was full gets the name.
 TEST_F(RecordCommand, AFullDiskKeepsWhatCame) {
   const auto ran = test::run("bash", {"-c", "ulimit -f 256 && exec \"$@\"", "record",

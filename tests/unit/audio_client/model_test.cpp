@@ -4,12 +4,15 @@
 #include <sys/stat.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
+#include <csignal>
 #include <filesystem>
 #include <fstream>
 #include <random>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "audio_client/analysis/model_report.hpp"
@@ -17,6 +20,8 @@
 #include "tests/support/content.hpp"
 #include "tests/support/process.hpp"
 #include "tests/support/temp_dir.hpp"
+#include "tests/support/wait.hpp"
+#include "tests/unit/sound/signals.hpp"
 
 namespace osteon::audio {
 namespace {
@@ -109,7 +114,10 @@ TEST_F(ModelProgram, WrongUseIsOneSentenceEach) {
       {{"resynthesise", path("pipe"), path("b.wav")}, {"pipe is a folder, a device or a pipe"}},
       {{"resynthesise", "/dev/zero", path("b.wav")}, {"/dev/zero is a folder, a device or a pipe"}},
       {{"resynthesise", path("a.model")}, {"OUT"}},
-      {{"resynthesise", "nothing.model", path("b.wav")}, {"nothing.model"}},
+      {{"resynthesise", "nothing.model", path("b.wav")}, {"no file nothing.model", "osteon-audio model --out"}},
+      {{"resynthesise", path("a.model"), ""}, {"OUT: the name is empty", "osteon-audio resynthesise --help"}},
+      {{"model", wav().string(), "--out", ""}, {"--out: the name is empty", "osteon-audio model --help"}},
+      {{"model", wav().string(), "--play", ""}, {"--play: the name is empty"}},
       {{"resynthesise", path("folder"), path("b.wav")}, {"folder"}},
       {{"resynthesise", path("huge.model"), path("b.wav")}, {"huge.model", "at most"}},
       {{"resynthesise", wav().string(), path("b.wav")}, {"drill.wav", "no spectral model"}},
@@ -129,6 +137,27 @@ TEST_F(ModelProgram, WrongUseIsOneSentenceEach) {
   EXPECT_EQ(test::content(wav()), recorded);
   EXPECT_EQ(test::content(temp_ / "a.model"), whole);
   EXPECT_TRUE(fs::is_fifo(temp_ / "pipe"));
+}
+
+// A long sound whose peaks are refined again and again.
+TEST_F(ModelProgram, AStopIsOneSentenceAndWritesNothing) {
+  ASSERT_TRUE(sound::write_wav(temp_ / "long.wav", sound::white_noise(0.1, 22050 * 120, 1), 22050));
+  const std::vector<std::pair<std::vector<std::string>, const char*>> cases = {
+      {{"model", path("long.wav"), "--refine", "20", "--out", path("x"), "--play", path("x.wav")},
+       "x.wav were not written"},
+      {{"model", path("long.wav"), "--refine", "20"}, "nothing was written"},
+      {{"preset", path("long.wav"), "--refine", "20", "--out", path("x")}, "x was not written"}};
+  for (const auto& [arguments, says] : cases) {
+    test::Process audio(test::program("osteon-audio"), arguments);
+    ASSERT_TRUE(test::wait_until([&] { return audio.err().find("modelling: ") != std::string::npos; },
+                                 std::chrono::seconds(60)))
+        << audio.err();
+    audio.signal(SIGINT);
+    EXPECT_EQ(audio.wait(std::chrono::seconds(60)), 130) << says;
+    EXPECT_THAT(audio.err(), testing::AllOf(testing::HasSubstr("osteon-audio: stopped; "), testing::HasSubstr(says)));
+    EXPECT_EQ(audio.out(), "");
+    for (const char* file : {"x", "x.wav"}) EXPECT_FALSE(fs::exists(temp_ / file)) << file;
+  }
 }
 
 // What is read by another program may be a link to where it shall be.

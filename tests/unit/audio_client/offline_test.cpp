@@ -183,6 +183,32 @@ TEST(OfflineSound, StopsWhenItIsAsked) {
   EXPECT_EQ(sound.error().code, ErrorCode::cancelled);
 }
 
+// Two states with 20 s between them: after the first, half of the record is read, and nearly all after the second.
+TEST(OfflineSound, ProgressIsThatOfTheSound) {
+  const std::vector<CuttingState> timed = timed_states();
+  std::vector<CuttingState> states{timed.front(), timed.front()};
+  states.back().time_ns += 20'000'000'000;
+  ListedStates record(states);
+  std::uint64_t frames = 0;
+  std::vector<double> seconds, done;
+  const auto sound = render_states(
+      record, {},
+      [&](std::span<const float> left, std::span<const float>) {
+        frames += left.size();
+        return Result<void>();
+      },
+      [&](double fraction) {
+        seconds.push_back(static_cast<double>(frames) / test::kRate_hz);
+        done.push_back(fraction);
+        return true;
+      },
+      20.0);
+  ASSERT_TRUE(sound) << sound.error().message;
+  ASSERT_GT(done.size(), 20U);
+  for (std::size_t i = 0; i < done.size(); ++i)
+    EXPECT_NEAR(done[i], std::min(1.0, seconds[i] / (20.0 + kLongestTail_s)), 0.01) << seconds[i];
+}
+
 // Both files of osteon-haptic, from the same ticks.
 TEST(StateRecord, ReadsWhatTheHapticClientWrites) {
   const test::TempDir temp;
@@ -292,6 +318,9 @@ TEST(StateRecord, RefusesABadTableByOneSentence) {
   EXPECT_THAT(refusal(header + good + "1001,boring,drill-3.2,900,0,0,0,0,3\n"),
               HasSubstr("line 3: phase is none of idle, free, cutting and rubbing (boring)"));
   EXPECT_THAT(refusal(header + good + "1001,free,drill-3.2,-5,0,0,0,0,3\n"), HasSubstr("line 3: rpm is -5"));
+  EXPECT_THAT(refusal(header + good + "1001,free,drill-3.2,1e300,0,0,0,0,3\n"),
+              HasSubstr("rpm is 1e+300, which no tool"));
+  EXPECT_THAT(refusal("rpm," + header + "0," + good), HasSubstr("log.csv: line 1 has the column rpm more than once"));
   EXPECT_THAT(refusal(header + good + "999,free,drill-3.2,900,0,0,0,0,3\n"),
               AllOf(HasSubstr("line 3: mono_ns is before"), HasSubstr("sort")));
   EXPECT_THAT(refusal(header + good + "1001,free,drill-3.2,900\n"), HasSubstr("line 3 has 4 fields"));
@@ -315,7 +344,7 @@ TEST(StateRecord, TellsOtherFilesApart) {
   std::ofstream(temp / "room.journal") << "SQLite format 3" << '\0';
   EXPECT_THAT(message("room.journal"), HasSubstr("keeps cuts but neither forces nor densities"));
   std::ofstream(temp / "a.h5") << "\x89HDF\r\n\x1a\n and nothing that follows";
-  EXPECT_THAT(message("a.h5"), HasSubstr("a.h5"));
+  EXPECT_THAT(message("a.h5"), AllOf(HasSubstr("a.h5"), HasSubstr("or give another recording")));
 }
 
 std::string long_log(int rows) {
@@ -328,9 +357,8 @@ std::string long_log(int rows) {
 TEST(RenderCommand, WritesTheSoundOfALog) {
   const test::TempDir temp;
   ASSERT_TRUE(write_file(temp / "log.csv", long_log(240)));
-  const auto ran = test::run(test::program("osteon-audio"),
-                             {"render", (temp / "log.csv").string(), "--out", (temp / "x.wav").string(), "--listen",
-                              "mono", "--listener", "0", "0", "0"});
+  const auto ran = test::run(test::program("osteon-audio"), {"render", (temp / "log.csv").string(), "--out",
+                                                             (temp / "x.wav").string(), "--listen", "mono"});
   ASSERT_EQ(ran.exit_code, 0) << ran.err;
   EXPECT_THAT(ran.out, AllOf(HasSubstr("states     240"), HasSubstr("listener   mono"),
                              HasSubstr("times as fast as it sounds")));
@@ -399,6 +427,11 @@ TEST(RenderCommand, RefusesAListenerThatCannotBe) {
   };
   EXPECT_THAT(refused({"--listen", "tin"}), HasSubstr("headphones"));
   EXPECT_THAT(refused({"--listener", "0", "0", "0"}), HasSubstr("--listener 0 0 0"));
+  EXPECT_THAT(refused({"--listen", "mono", "--listener", "0", "0", "100"}), HasSubstr("another --listen than mono"));
+  EXPECT_THAT(refused({"--listen", "mono", "--listener-up", "0", "0", "1"}), HasSubstr("another --listen than mono"));
+  EXPECT_THAT(refused({"--listener", "0", "0", "200", "--listener-up", "0", "0", "1"}),
+              AllOf(HasSubstr("no side is left"), HasSubstr("--listener-up"), HasSubstr("such as 0 -1 0")));
+  EXPECT_THAT(refused({"--listener", "0", "300", "0"}), HasSubstr("such as 0 0 1"));  // up is 0 -1 0
   EXPECT_THAT(refused({"--hrtf", "a.sofa"}), HasSubstr("--listen headphones"));
   EXPECT_THAT(refused({"--listen", "headphones", "--rate", "96000"}), HasSubstr("--rate of headphones is at most"));
 }
@@ -423,6 +456,14 @@ TEST(RenderCommand, PlaysAToolByItsPreset) {
       test::run(test::program("osteon-audio"), {"render", (temp / "log.csv").string(), "--out", own, "--preset", own});
   EXPECT_EQ(lost.exit_code, 1);
   EXPECT_THAT(lost.err, HasSubstr("would lose what is read"));
+}
+
+TEST(RenderCommand, TakesNoEmptyName) {
+  const test::TempDir temp;
+  ASSERT_TRUE(write_file(temp / "log.csv", long_log(10)));
+  const auto ran = test::run(test::program("osteon-audio"), {"render", (temp / "log.csv").string(), "--out", ""});
+  EXPECT_EQ(ran.exit_code, 1);
+  EXPECT_EQ(ran.err, "osteon-audio: --out: the name is empty; give a file; see osteon-audio render --help\n");
 }
 
 TEST(RenderCommand, RefusesToLoseTheRecord) {

@@ -17,6 +17,7 @@
 #include "audio_client/output/volume_ramp.hpp"
 #include "common/sound/levels.hpp"
 #include "tests/support/allocation_counter.hpp"
+#include "tests/support/size_limit.hpp"
 #include "tests/support/temp_dir.hpp"
 #include "tests/support/wait.hpp"
 #include "tests/unit/audio_client/scripted_drilling.hpp"
@@ -329,7 +330,7 @@ TEST(WavRecorder, ChannelsAreKeptApartOrAveraged) {
     right[i] = -0.5F * left[i];
   }
   for (const int channels : {1, 2}) {
-    auto recorder = WavRecorder::open(temp / "a.wav", 48000, channels);
+    auto recorder = WavRecorder::open(temp / "a.wav", 48000, channels, Existing::replaced);
     ASSERT_TRUE(recorder);
     recorder->push(left, right);
     ASSERT_TRUE(recorder->close());
@@ -352,6 +353,53 @@ TEST(WavRecorder, ChannelsAreKeptApartOrAveraged) {
       }
     }
   }
+}
+
+TEST(WavRecorder, TakesNoFileThatIsThereOrInUse) {
+  const test::TempDir temp;
+  const std::filesystem::path file = temp / "a.wav";
+  {
+    auto first = WavRecorder::open(file, 48000, 1);
+    ASSERT_TRUE(first) << first.error().message;
+    first->push(std::vector<float>(256, 0.5F), std::vector<float>(256, 0.5F));
+    for (const Existing existing : {Existing::refused, Existing::replaced}) {
+      const auto second = WavRecorder::open(file, 48000, 1, existing);
+      ASSERT_FALSE(second);
+      EXPECT_EQ(second.error().code, ErrorCode::exists);
+      EXPECT_THAT(second.error().message,
+                  testing::AllOf(testing::HasSubstr(file.string()), testing::HasSubstr("--wav")));
+    }
+    ASSERT_TRUE(first->close());
+  }
+  EXPECT_EQ(std::filesystem::file_size(file), 44U + 2 * 256) << "the sound of the first is whole";
+  const auto again = WavRecorder::open(file, 48000, 1);
+  ASSERT_FALSE(again);
+  EXPECT_THAT(again.error().message, testing::HasSubstr("add --overwrite"));
+  EXPECT_TRUE(WavRecorder::open(file, 48000, 1, Existing::replaced));
+}
+
+TEST(WavRecorder, AFullDiskIsSaidAtOnceAndCounted) {
+  constexpr std::uint64_t kRoom = 44 + 4 * 10'000;  // a header and 10 000 frames
+  const test::TempDir temp;
+  auto recorder = WavRecorder::open(temp / "a.wav", 48000, 2);
+  ASSERT_TRUE(recorder) << recorder.error().message;
+  EXPECT_EQ(recorder->trouble(), "");
+  const std::vector<float> second(48000, 0.25F);
+  Result<void> closed;
+  {
+    const test::SizeLimit full(kRoom);
+    recorder->push(second, second);
+    EXPECT_TRUE(test::wait_until([&] { return !recorder->trouble().empty(); }, std::chrono::seconds{30}));
+    recorder->push(second, second);
+    closed = recorder->close();
+  }
+  ASSERT_FALSE(closed);
+  EXPECT_THAT(closed.error().message,
+              testing::AllOf(testing::HasSubstr((temp / "a.wav").string()), testing::HasSubstr("File too large"),
+                             testing::HasSubstr("make room on the disk")));
+  EXPECT_EQ(std::filesystem::file_size(temp / "a.wav"), kRoom);
+  EXPECT_EQ(recorder->frames_written(), 10'000U);
+  EXPECT_EQ(recorder->frames_lost(), 2 * 48'000U - 10'000U);
 }
 
 TEST(WavRecorder, FullQueueIsCountedAndNeverWaits) {

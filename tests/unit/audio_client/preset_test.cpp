@@ -313,6 +313,22 @@ TEST(RecordedPreset, OfBlowsHasTheirModesAndTheirImpacts) {
       << parse_preset(to_yaml(made->model), "a.yaml").error().message;
 }
 
+// Clicks of 1 ms, as a drill that was dropped might make.
+TEST(RecordedPreset, BlowsThatDoNotRingAreSaid) {
+  std::vector<float> recording = recorded_blows({});
+  const std::vector<float> click = sound::white_noise(0.3, 44, 3);
+  for (std::size_t blow = 0; blow < 6; ++blow)
+    for (std::size_t i = 0; i < click.size(); ++i) recording[kFirstBlow + blow * 26460 + i] += click[i];
+  const auto made = recorded_preset(recording, 44100, preset_of("broach"), {.name = "mine", .tools = {}});
+  ASSERT_TRUE(made) << made.error().message;
+  EXPECT_EQ(made->model.blow.modes.size(), 0U);
+  EXPECT_THAT(made->text, AllOf(HasSubstr("note       nothing rings"), HasSubstr("--tool")));
+  const auto ringing =
+      recorded_preset(recorded_blows({{700.0, 0.3}}), 44100, preset_of("broach"), {.name = "mine", .tools = {}});
+  ASSERT_TRUE(ringing) << ringing.error().message;
+  EXPECT_THAT(ringing->text, testing::Not(HasSubstr("note")));
+}
+
 // The recorded blow has the modes in it. If they began with it, it would sound twice: a transient begins 1 ms before
 // its impact, which is a whole number of periods of these modes, so that they would add up to 6 dB more.
 TEST(RecordedPreset, ABlowIsAsLoudAsItsRecordingFromItsBeginning) {

@@ -222,6 +222,27 @@ TEST_F(AudioProcess, ServerThatGoesAwayIsOneSentenceAndAFinishedRecording) {
   EXPECT_TRUE(std::filesystem::exists(temp_ / "a.json"));
 }
 
+// The size of a file ends where the disk would be full.
+TEST_F(AudioProcess, AFullDiskIsSaidWhileTheSoundGoesOn) {
+  constexpr std::uint64_t kRoom = 256 * 1024;
+  std::vector<std::string> limited{"-c", "ulimit -f 256 && exec \"$@\"", "osteon-audio",
+                                   test::program("osteon-audio").string()};
+  const std::vector<std::string> own = arguments();
+  limited.insert(limited.end(), own.begin(), own.end());
+  test::Process audio("bash", limited);
+  EXPECT_TRUE(test::wait_until([&] { return audio.err().find("File too large") != std::string::npos; }, 60s))
+      << audio.err();
+  EXPECT_TRUE(audio.running());
+  EXPECT_EQ(audio.terminate(), 1);
+  EXPECT_THAT(audio.err(), testing::HasSubstr("osteon-audio: the recording " + (temp_ / "a.wav").string() +
+                                              " could not be written whole (File too large)"));
+  const nlohmann::json summary = nlohmann::json::parse(*read_file(temp_ / "a.json"));
+  EXPECT_EQ(std::filesystem::file_size(temp_ / "a.wav"), kRoom);
+  EXPECT_EQ(summary["wav_frames"], (kRoom - 44) / 4);
+  EXPECT_EQ(summary["wav_frames"].get<std::uint64_t>() + summary["wav_frames_lost"].get<std::uint64_t>(),
+            summary["frames"].get<std::uint64_t>());
+}
+
 TEST_F(AudioProcess, KilledListenerDisturbsNobody) {
   test::Process audio(test::program("osteon-audio"), arguments());
   ASSERT_TRUE(test::wait_until([&] { return audio.err().find("joined") != std::string::npos; }, 20s)) << audio.err();
@@ -243,6 +264,7 @@ TEST(AudioProgram, WrongInputsAreOneSentenceEach) {
       {{"--server", "127.0.0.1:1", "--plain", "--output", "tape"}, "--output none"},
       {{"--server", "127.0.0.1:1", "--plain", "--output", "none", "--wav", "/nowhere/a.wav"}, "/nowhere/a.wav"},
       {{"--server", "127.0.0.1:1", "--plain", "--output", "none", "--state-log", "/nowhere/a.csv"}, "/nowhere/a.csv"},
+      {{"--server", "127.0.0.1:1", "--plain", "--output", "none", "--summary", "/nowhere/a.json"}, "/nowhere/a.json"},
       {{"--server", "127.0.0.1:1", "--plain", "--output", "pulse"}, "--output none"},
       {{"--output", "none"}, "--server"},
       {{"--server", "127.0.0.1:1", "--plain", "--output", "none", "--listen", "quadraphony"}, "--listen loudspeakers"},
@@ -253,6 +275,9 @@ TEST(AudioProgram, WrongInputsAreOneSentenceEach) {
        "--hrtf another file"},
       {{"--server", "127.0.0.1:1", "--plain", "--output", "none", "--listener", "0", "0", "0"}, "--listener"},
       {{"--server", "127.0.0.1:1", "--plain", "--output", "none", "--device", "0"}, "--output pulse"},
+      {{"--server", "127.0.0.1:1", "--plain", "--output", "none", "--timeout", "nan"}, "nan is not a number from 0"},
+      {{"--server", "127.0.0.1:1", "--plain", "--output", "none", "--wav", ""}, "--wav: the name is empty"},
+      {{"--server", "127.0.0.1:1", "--plain", "--output", "none", "--summary", ""}, "--summary: the name is empty"},
       {{"devices"}, "no sound server answers"},
   };
   for (const Case& wrong : cases) {
@@ -284,14 +309,27 @@ TEST(AudioProgram, WritesNoFileOverAnotherOne) {
   }
 }
 
+TEST(AudioProgram, RefusesAnEarlierRecordingAtOnce) {
+  const test::TempDir temp;
+  const std::string file = (temp / "a.wav").string();
+  ASSERT_TRUE(write_file(file, "earlier sound"));
+  const test::RunResult result = test::run(test::program("osteon-audio"),
+                                           {"--server", "127.0.0.1:1", "--plain", "--output", "none", "--wav", file});
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_THAT(result.err, testing::HasSubstr(file + " is already there; give --wav another name, or add --overwrite"));
+  EXPECT_EQ(*read_file(file), "earlier sound");
+}
+
 TEST(AudioProgram, WithoutAServerAnEarlierRecordingStays) {
   const test::TempDir temp;
   ASSERT_TRUE(write_file(temp / "a.wav", "earlier sound"));
   ASSERT_TRUE(write_file(temp / "a.csv", "earlier rows"));
-  const test::RunResult result = test::run(
-      test::program("osteon-audio"), {"--server", "127.0.0.1:1", "--plain", "--output", "none", "--timeout", "0.2",
-                                      "--wav", (temp / "a.wav").string(), "--state-log", (temp / "a.csv").string()});
+  const test::RunResult result =
+      test::run(test::program("osteon-audio"),
+                {"--server", "127.0.0.1:1", "--plain", "--output", "none", "--timeout", "0.2", "--wav",
+                 (temp / "a.wav").string(), "--state-log", (temp / "a.csv").string(), "--overwrite"});
   EXPECT_EQ(result.exit_code, 1);
+  EXPECT_THAT(result.err, testing::HasSubstr("127.0.0.1:1"));
   EXPECT_EQ(*read_file(temp / "a.wav"), "earlier sound");
   EXPECT_EQ(*read_file(temp / "a.csv"), "earlier rows");
 }

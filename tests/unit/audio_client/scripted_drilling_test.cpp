@@ -46,7 +46,7 @@ TEST(ScriptedDrilling, TheEarTellsTheLayersApart) {
   const test::TempDir temp;
   const char* keep = std::getenv("OSTEON_SOUND_DIR");
   const std::filesystem::path file = (keep ? std::filesystem::path(keep) : temp.path()) / "scripted-drilling.wav";
-  auto recorder = WavRecorder::open(file, 48000, 1);
+  auto recorder = WavRecorder::open(file, 48000, 1, Existing::replaced);
   ASSERT_TRUE(recorder) << recorder.error().message;
   const auto push = [&](std::span<const float> part) { recorder->push(part, part); };
   push(std::span(samples).first(200000));

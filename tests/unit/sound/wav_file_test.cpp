@@ -264,6 +264,37 @@ TEST(WavWriter, WhatIsKeptAndCannotGetItsNameIsLeftAndNamed) {
   EXPECT_EQ(read->samples.size(), samples.size());
 }
 
+TEST(WavWriter, ReplacesNoFileThatWasMadeMeanwhile) {
+  const test::TempDir temp;
+  const fs::path file = temp / "a.wav", partial = temp / ("a.wav.partial-" + std::to_string(::getpid()));
+  const std::vector<float> samples = tone(440, 0.5, 22050, 22050);
+  {
+    auto writer = WavWriter::open(file, kRecording, Unfinished::kept, Older::kept);
+    ASSERT_TRUE(writer) << writer.error().message;
+    ASSERT_TRUE(writer->write(samples));
+    put(file, "of another recorder");
+    const auto closed = writer->close();
+    ASSERT_FALSE(closed);
+    EXPECT_EQ(closed.error().code, ErrorCode::exists);
+    EXPECT_THAT(closed.error().message, testing::AllOf(testing::HasSubstr("another program made " + file.string()),
+                                                       testing::HasSubstr(partial.string() + " has the sound")));
+  }
+  EXPECT_EQ(test::content(file), "of another recorder");
+  const auto read = read_wav(partial);
+  ASSERT_TRUE(read) << read.error().message;
+  EXPECT_EQ(read->samples.size(), samples.size());
+}
+
+TEST(WavWriter, ThatReplacesNothingGivesANewFileItsName) {
+  const test::TempDir temp;
+  auto writer = WavWriter::open(temp / "a.wav", kRecording, Unfinished::kept, Older::kept);
+  ASSERT_TRUE(writer) << writer.error().message;
+  ASSERT_TRUE(writer->write(tone(440, 0.5, 22050, 22050)));
+  const auto closed = writer->close();
+  ASSERT_TRUE(closed) << closed.error().message;
+  EXPECT_EQ(test::names_in(temp.path()), std::set<std::string>{"a.wav"});
+}
+
 TEST(WavFile, OfACutFileIsReadWhatIsThere) {
   const test::TempDir temp;
   ASSERT_TRUE(write_wav(temp / "whole.wav", tone(440, 0.5, 8000, 22050), 22050));
@@ -282,6 +313,23 @@ TEST(WavFile, OfACutFileIsReadWhatIsThere) {
     EXPECT_DOUBLE_EQ(read->file_s, read->seconds());
   }
   EXPECT_FALSE(all->announced_s);
+}
+
+// libsndfile calls such a file an error of its own.
+TEST(WavFile, ADamagedHeaderIsNamed) {
+  const test::TempDir temp;
+  ASSERT_TRUE(write_wav(temp / "a.wav", tone(440, 0.5, 8000, 22050), 22050));
+  const std::string whole = test::content(temp / "a.wav");
+  for (const std::size_t at : {22U, 24U}) {  // NumChannels, SampleRate
+    std::string damaged = whole;
+    damaged.replace(at, 2, std::string(2, '\0'));
+    put(temp / "b.wav", damaged);
+    const auto read = read_wav(temp / "b.wav");
+    ASSERT_FALSE(read) << at;
+    EXPECT_THAT(read.error().message,
+                testing::AllOf(testing::HasSubstr((temp / "b.wav").string()), testing::ContainsRegex("convert|record"),
+                               testing::Not(testing::HasSubstr("rror :"))));
+  }
 }
 
 TEST(WavFile, ASizeThatNobodyWroteIsThatOfTheFile) {
