@@ -9,6 +9,7 @@
 
 #include "audio_client/analysis/analysis.hpp"
 #include "audio_client/analysis/model_report.hpp"
+#include "audio_client/analysis/recording_notes.hpp"
 #include "audio_client/app/output_file.hpp"
 #include "audio_client/app/recording_option.hpp"
 #include "common/runtime/files.hpp"
@@ -32,7 +33,7 @@ Result<std::string> run_model(const ModelArguments& a) {
   const auto recording = read(a.recording);
   if (!recording) return tl::unexpected(recording.error());
   const ModelReport report = model_report(*recording, a.refinements, a.seed);
-  std::string text = to_text(report);
+  std::string text = to_text(report) + recording_notes(*recording);
   if (!a.out.empty()) {
     if (auto written = write_file(a.out, report.bytes); !written) return tl::unexpected(written.error());
     text += "written    " + a.out + "\n";
