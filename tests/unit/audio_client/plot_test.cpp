@@ -118,7 +118,7 @@ TEST_F(PlotTest, ASecondAxisHasItsNumbersAtTheRight) {
   };
   EXPECT_TRUE(inked(168, 173, 67, 74)) << "0";
   EXPECT_TRUE(inked(174, 179, 17, 24)) << "the second digit of 20";
-  EXPECT_TRUE(inked(190, 205, 8, 15) && !inked(161, 190, 8, 15)) << "the label ends 44 pixels behind the frame";
+  EXPECT_TRUE(inked(190, 200, 8, 15) && !inked(161, 190, 8, 15)) << "the label ends 44 pixels behind the frame";
 }
 
 // A unit is another one in capitals: mm and Mm, s and S.
