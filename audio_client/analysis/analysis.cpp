@@ -6,6 +6,7 @@
 #include <functional>
 #include <iterator>
 
+#include "audio_client/analysis/recording_notes.hpp"
 #include "common/sound/levels.hpp"
 #include "common/sound/resample.hpp"
 #include "common/sound/spectral_subtraction.hpp"
@@ -136,6 +137,7 @@ Result<SoundAnalysis> analyse(const sound::WavSound& recording, const AnalysisPa
   a.file_rate_hz = recording.rate_hz, a.file_channels = recording.channels, a.file_bits = recording.bits;
   a.file_floating = recording.floating, a.announced_s = recording.announced_s;
   a.from_s = recording.from_s, a.file_s = recording.file_s;
+  a.clipped = recording.clipped, a.file_notes = recording_notes(recording);
   const std::function<void()> parts[] = {
       [&] {
         a.samples = sound::resampled(recording.samples, recording.rate_hz, a.rate_hz);

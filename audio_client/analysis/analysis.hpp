@@ -2,6 +2,7 @@
 // a cutting drill and a free one.
 #pragma once
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "common/core/keep_going.hpp"
@@ -66,6 +67,8 @@ struct SoundAnalysis {
   bool file_floating = false;
   double from_s = 0, file_s = 0;           // times of all results count from from_s of the file
   std::optional<double> announced_s = {};  // as in WavSound
+  std::size_t clipped = 0;                 // likewise
+  std::string file_notes;                  // recording_notes()
   double rate_hz = kAnalysisRate_hz;
   std::vector<float> samples;  // at rate_hz
   double level_db = 0, peak = 0;

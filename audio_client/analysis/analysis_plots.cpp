@@ -18,14 +18,12 @@ using picture::Picture;
 using sound::DrillingState;
 
 constexpr int kWidth = 1100, kLeft = 64, kRight = 16, kPlotWidth = kWidth - kLeft - kRight;
-constexpr Colour kSignal{74, 111, 165}, kAccent{200, 85, 61}, kBone{176, 141, 87}, kQuiet{150, 150, 150};
+constexpr Colour kSignal{74, 111, 165}, kAccent{200, 85, 61}, kBone{176, 141, 87};
 constexpr Colour kLineInk{120, 90, 40};
 
 // Okabe and Ito's colours, which people with impaired colour vision tell apart (Okabe 2008).
 constexpr std::array<Colour, sound::kDrillingStates> kStateColours = {
-    {{153, 153, 153}, {0, 114, 178}, {213, 94, 0}, {230, 159, 0}, {204, 121, 167}, {100, 100, 100}}};
-
-Colour colour_of(DrillingState state) { return kStateColours[static_cast<std::size_t>(state)]; }
+    {{153, 153, 153}, {0, 114, 178}, {213, 94, 0}, {230, 159, 0}, {204, 121, 167}, {0, 158, 115}}};
 
 std::string hertz(double from_hz, double to_hz) {
   std::array<char, 48> text{};
@@ -109,7 +107,7 @@ NamedPicture density(const SoundAnalysis& a) {
   for (const FoundLine& line : a.lines)
     if (line.line.hz < 0.5 * a.rate_hz) plot.vertical_line(line.line.hz, picture::mixed(kPaper, kBone, 0.6));
   int line = 0;
-  draw_density(plot, a.whole, kQuiet, "whole", line++);
+  draw_density(plot, a.whole, kWholeColour, "whole", line++);
   for (const StateSpectrum& of : a.spectra)
     draw_density(plot, of.spectrum, colour_of(of.state), sound::name(of.state), line++);
   // Below 900 Hz the names would lie on each other.
@@ -168,6 +166,8 @@ Axis displacement_axis(std::span<const DisplacementRow> rows) {
 
 NamedPicture bands(const SoundAnalysis& a, std::span<const DisplacementRow> displacement) {
   constexpr int kHeight = 84, kStep = 134;
+  // With the displacement, each band has a second axis.
+  const int width = kPlotWidth - (displacement.empty() ? 0 : Plot::kRightAxis - kRight);
   const int panels = static_cast<int>(a.bands.size()) + (displacement.empty() ? 0 : 1);
   Picture page(kWidth, 24 + panels * kStep, kPaper);
   std::vector<double> time_s, mm;
@@ -175,7 +175,7 @@ NamedPicture bands(const SoundAnalysis& a, std::span<const DisplacementRow> disp
   int y = 24;
   if (!displacement.empty()) {
     const Axis vertical = displacement_axis(displacement);
-    Plot plot(page, {kLeft, y, kPlotWidth, kHeight}, time_axis(a), vertical);
+    Plot plot(page, {kLeft, y, width, kHeight}, time_axis(a), vertical);
     mark_states(plot, a, vertical);
     plot.curve(time_s, mm, kAccent);
     name_states(plot, a);
@@ -184,11 +184,12 @@ NamedPicture bands(const SoundAnalysis& a, std::span<const DisplacementRow> disp
   for (const BandInTime& of : a.bands) {
     const sound::Band band = sound::packet_band(of.packet, a.rate_hz);
     const double reach = reach_of(of.samples);
-    const Axis vertical{-reach, reach, sound::packet_name(of.packet) + ": " + hertz(band.from_hz, band.to_hz)};
-    Plot plot(page, {kLeft, y, kPlotWidth, kHeight}, time_axis(a), vertical);
+    const Axis vertical{
+        -reach, reach,
+        sound::packet_name(of.packet) + ", " + hertz(band.from_hz, band.to_hz) + ": amplitude, full scale = 1"};
+    Plot plot(page, {kLeft, y, width, kHeight}, time_axis(a), vertical);
     mark_states(plot, a, vertical);
     plot.samples(of.samples, a.rate_hz, kSignal);
-    // The displacement on an axis of its own, which the first panel shows.
     if (!displacement.empty()) {
       const Axis own = displacement_axis(displacement);
       std::vector<double> scaled(mm.size());
@@ -196,6 +197,7 @@ NamedPicture bands(const SoundAnalysis& a, std::span<const DisplacementRow> disp
         return vertical.low + (vertical.high - vertical.low) * (at - own.low) / (own.high - own.low);
       });
       plot.curve(time_s, scaled, kAccent);
+      plot.right_axis(own, kAccent);
     }
     y += kStep;
   }
@@ -223,6 +225,8 @@ NamedPicture difference(const SoundAnalysis& a) {
 }
 
 }  // namespace
+
+Colour colour_of(DrillingState state) { return kStateColours[static_cast<std::size_t>(state)]; }
 
 std::vector<NamedPicture> pictures_of(const SoundAnalysis& analysis, std::span<const DisplacementRow> displacement) {
   std::vector<NamedPicture> pictures;

@@ -39,13 +39,7 @@ std::string channels_text(int channels) {
 
 // What the user should know of the recording, a line each.
 std::string notes_of(const SoundAnalysis& a) {
-  std::string text;
-  if (a.announced_s && *a.announced_s > 0)
-    text += formatted("note       the header announces %.4g s; %.4g s are there\n", *a.announced_s, a.file_s);
-  if (a.announced_s && *a.announced_s == 0)
-    text += formatted("note       the header gives no length; %.4g s are there\n", a.file_s);
-  if (a.file_bits == 8)
-    text += "note       8 bits: their quantisation noise, about -53 dB re full scale, hides a quiet room\n";
+  std::string text = a.file_notes;
   const auto silent = [](const sound::StateSpan& span) { return span.state == sound::DrillingState::before; };
   if (std::ranges::all_of(a.states, silent))
     text += std::string("note       no drill was heard") +
@@ -237,6 +231,7 @@ std::string to_json(const SoundAnalysis& a) {
       {"gear_lines", lines_json(a)},
       {"difference", nullptr},
   };
+  if (a.clipped > 0) report["recording"]["clipped_samples"] = a.clipped;
   if (a.announced_s) report["recording"]["announced_s"] = rounded(*a.announced_s);
   if (a.difference)
     report["difference"] = {{"free_from_s", rounded(a.difference->free.from_s)},

@@ -13,6 +13,7 @@ using picture::Colour;
 using picture::text_width;
 
 constexpr int kTickLength = 4;
+constexpr int kTickEvery_x = 90, kTickEvery_y = 18;  // pixels, about
 
 // 1, 2 or 5 times a power of ten: about `count` steps in the axis.
 double tick_step(const Axis& axis, int count) {
@@ -44,7 +45,8 @@ std::string tick_text(double value, double step) {
 Plot::Plot(picture::Picture& picture, const Frame& frame, const Axis& horizontal, const Axis& vertical)
     : picture_(picture), frame_(frame), horizontal_(horizontal), vertical_(vertical) {
   const int bottom = frame.y + frame.height;
-  const double step_x = tick_step(horizontal, frame.width / 90), step_y = tick_step(vertical, frame.height / 18);
+  const double step_x = tick_step(horizontal, frame.width / kTickEvery_x),
+               step_y = tick_step(vertical, frame.height / kTickEvery_y);
   for (const double x : ticks(horizontal, step_x)) {
     const int at = static_cast<int>(std::lround(column(x)));
     picture.fill(at, frame.y, 1, frame.height, kGrid);
@@ -63,6 +65,19 @@ Plot::Plot(picture::Picture& picture, const Frame& frame, const Axis& horizontal
   picture.fill(frame.x - 1, frame.y, 1, frame.height + 1, kInk);
   picture.text(frame.x + frame.width - text_width(horizontal.label), bottom + kTickLength + 14, horizontal.label, kInk);
   picture.text(frame.x - 56, frame.y - 12, vertical.label, kInk);
+}
+
+void Plot::right_axis(const Axis& axis, Colour colour) {
+  const int right = frame_.x + frame_.width;
+  const double step = tick_step(axis, frame_.height / kTickEvery_y);
+  for (const double y : ticks(axis, step)) {
+    const double part = (y - axis.low) / (axis.high - axis.low);
+    const int at = static_cast<int>(std::lround(frame_.y + (1.0 - part) * (frame_.height - 1)));
+    picture_.fill(right, at, kTickLength, 1, colour);
+    picture_.text(right + kTickLength + 3, at - 3, tick_text(y, step), colour);
+  }
+  picture_.fill(right, frame_.y, 1, frame_.height + 1, colour);
+  picture_.text(right + kRightAxis - text_width(axis.label), frame_.y - 12, axis.label, colour);
 }
 
 double Plot::column(double x) const {

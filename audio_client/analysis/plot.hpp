@@ -27,6 +27,10 @@ class Plot {
   // Draws grid, numbers and labels around the frame, for which it needs 60 pixels on the left and 36 below.
   Plot(picture::Picture& picture, const Frame& frame, const Axis& horizontal, const Axis& vertical);
 
+  // A second vertical axis at the right, for a curve() that is scaled to it. It needs kRightAxis pixels there.
+  void right_axis(const Axis& axis, picture::Colour colour);
+  static constexpr int kRightAxis = 44;
+
   // Joins the points (x[i], y[i]); x rises. Of points in one column of pixels, it draws the whole range.
   void curve(std::span<const double> x, std::span<const double> y, picture::Colour colour);
   // The same for samples at x = i / rate, whose number may be large.

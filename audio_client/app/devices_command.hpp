@@ -1,4 +1,4 @@
-// osteon-audio devices: the sinks that --device can name.
+// osteon-audio devices: the sinks and sources that --device can name.
 #pragma once
 #include <functional>
 #include <string>

@@ -388,8 +388,10 @@ int main(int argc, char** argv) try {
   wire::add_credential_options(app, options.credentials);
   app.add_option("--output", options.output, "pulse: a sink of PulseAudio; none: at the same pace to nowhere")
       ->capture_default_str();
-  app.add_option("--device", options.device,
-                 "Name or number of a sink, as osteon-audio devices lists them; by default, the server's own choice");
+  app.add_option(
+      "--device", options.device,
+      "Name or number of a sink, as osteon-audio devices lists them, or a part of the name that no other has; "
+      "by default, the server's own choice");
   audio::add_listening(app, options.listening, "the bone");
   app.add_option("--preset", options.presets,
                  "Preset of a tool's sound, or a folder of presets, which go before those of Osteon; may be repeated")

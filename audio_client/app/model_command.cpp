@@ -9,6 +9,7 @@
 
 #include "audio_client/analysis/analysis.hpp"
 #include "audio_client/analysis/model_report.hpp"
+#include "audio_client/analysis/recording_notes.hpp"
 #include "audio_client/app/output_file.hpp"
 #include "audio_client/app/recording_option.hpp"
 #include "common/runtime/files.hpp"
@@ -38,7 +39,7 @@ Result<std::string> run_model(const ModelArguments& a) {
   const auto made = model_report(*recording, a.refinements, a.seed, [&](double done) { return progress.go_on(done); });
   if (!made) return stopped_before({a.out, a.play});
   const ModelReport& report = *made;
-  std::string text = to_text(report);
+  std::string text = to_text(report) + recording_notes(*recording);
   if (!a.out.empty()) {
     if (auto written = write_file(a.out, report.bytes); !written) return tl::unexpected(written.error());
     text += "written    " + a.out + "\n";

@@ -7,6 +7,7 @@
 #include <memory>
 #include <utility>
 
+#include "audio_client/analysis/recording_notes.hpp"
 #include "audio_client/app/output_file.hpp"
 #include "audio_client/app/recording_option.hpp"
 #include "audio_client/presets/preset_file.hpp"
@@ -73,7 +74,8 @@ Result<std::string> run_preset(const PresetArguments& a) {
   if (auto written = write_file(a.out, yaml); !written) return tl::unexpected(written.error());
   std::string tools;
   for (const std::string& tool : made->model.tools) tools += (tools.empty() ? "" : ", ") + tool;
-  return made->text + "for        " + tools + "\nwritten    " + a.out + ", " + std::to_string(yaml.size()) + " bytes\n";
+  return made->text + recording_notes(*recording) + "for        " + tools + "\nwritten    " + a.out + ", " +
+         std::to_string(yaml.size()) + " bytes\n";
 }
 
 }  // namespace

@@ -160,8 +160,10 @@ void add_record_command(CLI::App& app, std::function<Result<std::string>()>& cho
       ->capture_default_str();
   command->add_option("--bits", a.bits, "Of a sample: 16 or 24")->check(CLI::IsMember({16, 24}))->capture_default_str();
   command->add_option("--channels", a.channels, "1 or 2")->check(CLI::Range(1, 2))->capture_default_str();
-  command->add_option("--device", a.input.device,
-                      "Name of the source, or a part of it that no other has; by default PulseAudio's default source");
+  command->add_option(
+      "--device", a.input.device,
+      "Name or number of a source, as osteon-audio devices lists them, or a part of the name that no other has; "
+      "by default PulseAudio's default source");
   command->add_flag("--overwrite", a.overwrite, "Replace a file of that name, when the new one is whole");
   command->callback([shared, &chosen] { chosen = [shared] { return run_record(*shared); }; });
 }

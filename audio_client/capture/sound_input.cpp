@@ -8,7 +8,6 @@
 #include <utility>
 #include <vector>
 
-#include "common/core/bounded_text.hpp"
 #include "common/runtime/spsc_queue.hpp"
 
 namespace osteon::audio {
@@ -26,39 +25,29 @@ tl::unexpected<Error> no_input(const std::string& what) {
                  "no source of sound answers (" + what + "); start PulseAudio, and connect a microphone");
 }
 
-struct Source {
-  unsigned id = 0;
-  std::string name;
-  bool standard = false;
+// RtAudio's view of the server. It lists the sinks too, and numbers them together with the sources.
+struct Sources {
+  std::vector<SoundDevice> devices;
+  std::vector<unsigned> ids;
 };
 
-std::vector<Source> sources_of(RtAudio& audio) {
-  std::vector<Source> sources;
+Sources sources_of(RtAudio& audio) {
+  Sources sources;
   for (unsigned id = 0; id < audio.getDeviceCount(); ++id) {
     const RtAudio::DeviceInfo info = audio.getDeviceInfo(id);
-    if (info.probed && info.inputChannels > 0) sources.push_back({id, info.name, info.isDefaultInput});
+    if (!info.probed || info.inputChannels == 0) continue;
+    sources.devices.push_back({info.name, info.inputChannels, info.preferredSampleRate, info.isDefaultInput});
+    sources.ids.push_back(id);
   }
   return sources;
 }
 
-// The source of a name, or of a part of it that only one has.
-Result<Source> chosen(const std::vector<Source>& sources, const std::string& wanted) {
-  if (sources.empty()) return no_input("it names no source");
-  if (wanted.empty()) {
-    const auto standard = std::ranges::find(sources, true, &Source::standard);
-    return standard == sources.end() ? sources.front() : *standard;
-  }
-  std::vector<Source> found;
-  std::string names;
-  for (const Source& source : sources) {
-    names += (names.empty() ? "" : ", ") + source.name;
-    if (source.name == wanted) return source;
-    if (source.name.find(wanted) != std::string::npos) found.push_back(source);
-  }
-  if (found.size() == 1) return found.front();
-  return failure(ErrorCode::not_found,
-                 (found.empty() ? "there is no source of sound named " : "several sources of sound have a name with ") +
-                     bounded_text(wanted, 80) + "; give --device one of: " + names);
+// Error: unavailable. There is no server.
+Result<void> begin(RtAudio& audio) {
+  if (audio.getCurrentApi() != RtAudio::LINUX_PULSE) return no_input("this RtAudio was built without PulseAudio");
+  audio.showWarnings(false);
+  if (audio.getDeviceCount() == 0) return no_input("no sound server answers");
+  return {};
 }
 
 }  // namespace
@@ -91,14 +80,14 @@ struct SoundInput::Impl {
   }
 
   Result<void> open() {
-    if (audio.getCurrentApi() != RtAudio::LINUX_PULSE) return no_input("this RtAudio was built without PulseAudio");
-    audio.showWarnings(false);
-    if (audio.getDeviceCount() == 0) return no_input("no sound server answers");
-    const auto source = chosen(sources_of(audio), params.device);
+    if (auto begun = begin(audio); !begun) return begun;
+    const Sources sources = sources_of(audio);
+    if (sources.devices.empty()) return no_input("it names no source");
+    const auto source = chosen_device(sources.devices, params.device, "source");
     if (!source) return tl::unexpected(source.error());
-    device = source->name;
+    device = sources.devices[*source].name;
     RtAudio::StreamParameters from;
-    from.deviceId = source->id;
+    from.deviceId = sources.ids[*source];
     from.nChannels = params.channels;
     RtAudio::StreamOptions options;
     options.streamName = "Osteon recording";
@@ -161,6 +150,16 @@ std::uint64_t SoundInput::frames_lost() const noexcept { return impl_->lost.load
 std::string SoundInput::failure_reason() const {
   if (!input_failed.load(std::memory_order_relaxed)) return {};
   return "the sound server or its source went away";
+}
+
+Result<std::vector<SoundDevice>> input_devices() {
+  try {
+    RtAudio audio(RtAudio::LINUX_PULSE);
+    if (auto begun = begin(audio); !begun) return tl::unexpected(begun.error());
+    return std::move(sources_of(audio).devices);
+  } catch (const RtAudioError& error) {
+    return no_input(error.getMessage());
+  }
 }
 
 }  // namespace osteon::audio

@@ -5,13 +5,15 @@
 #include <memory>
 #include <span>
 #include <string>
+#include <vector>
 
+#include "audio_client/device/sound_device.hpp"
 #include "common/core/result.hpp"
 
 namespace osteon::audio {
 
 struct InputParams {
-  std::string device;  // its name, or a part that only one has; empty: the default one
+  std::string device;  // one of input_devices(), as chosen_device() takes it
   unsigned rate_hz = 48000;
   unsigned channels = 1;  // 1 or 2
 };
@@ -28,7 +30,7 @@ struct InputPiece {
 // The sound server's thread pushes into a fixed queue, which one other thread empties.
 class SoundInput {
  public:
-  // Errors: unavailable (no server, no source), not_found (no source of that name; names those that are there).
+  // Errors: unavailable (no server, no source), those of chosen_device().
   [[nodiscard]] static Result<std::unique_ptr<SoundInput>> open(const InputParams& params);
   ~SoundInput();
 
@@ -46,5 +48,8 @@ class SoundInput {
   explicit SoundInput(std::unique_ptr<Impl> impl);
   std::unique_ptr<Impl> impl_;
 };
+
+// The sources, in RtAudio's order; none is no error. Error: unavailable, with the remedy.
+[[nodiscard]] Result<std::vector<SoundDevice>> input_devices();
 
 }  // namespace osteon::audio

@@ -10,6 +10,7 @@
 #include <string_view>
 #include <vector>
 
+#include "audio_client/device/sound_device.hpp"
 #include "common/core/result.hpp"
 
 namespace osteon::audio {
@@ -30,7 +31,7 @@ struct OutputParams {
   unsigned rate_hz = 48000;
   unsigned frames = 256;  // in one buffer
   unsigned buffers = 4;   // ahead of the sound card; two left rare audible gaps on PulseAudio
-  std::string device{};   // name of a sink, or its number in output_devices(); empty: the default one
+  std::string device{};   // a sink of output_devices(), as chosen_device() takes it
 };
 
 class AudioOutput {
@@ -54,20 +55,8 @@ class AudioOutput {
 // Opens the output without starting it. The source must outlive the output. Error: unavailable, with the remedy.
 [[nodiscard]] Result<std::unique_ptr<AudioOutput>> open_output(const OutputParams& params, SoundSource& source);
 
-// A sink of the sound server: all that RtAudio 5.2 tells of it. It does not tell the server's own short name, the
-// latency, or whether anything is plugged in.
-struct OutputDevice {
-  std::string name;  // the server's description, such as "Built-in Audio Analog Stereo"
-  unsigned channels = 0;
-  unsigned rate_hz = 0;  // at which it runs; other rates are converted by the server
-  bool is_default = false;
-};
-// In RtAudio's order. Error: unavailable, with the remedy.
-[[nodiscard]] Result<std::vector<OutputDevice>> output_devices();
-
-// The sink that `wanted` names, which may also be its number, from 0. Empty: the default one. Errors, invalid_input:
-// there is none, or several have this name.
-[[nodiscard]] Result<std::size_t> chosen_device(const std::vector<OutputDevice>& devices, const std::string& wanted);
+// The sinks, in RtAudio's order. Error: unavailable, with the remedy.
+[[nodiscard]] Result<std::vector<SoundDevice>> output_devices();
 
 // The outputs that open_output() makes.
 [[nodiscard]] Result<std::unique_ptr<AudioOutput>> open_pulse_output(const OutputParams& params, SoundSource& source);

@@ -51,7 +51,7 @@ class Raised {
 
 // RtAudio's view of the server. It lists the sources too, and numbers them together with the sinks.
 struct PulseDevices {
-  std::vector<OutputDevice> sinks;
+  std::vector<SoundDevice> sinks;
   std::vector<unsigned> ids;  // of the sinks
 };
 
@@ -87,7 +87,7 @@ class PulseOutput final : public AudioOutput {
       audio_ = std::move(*audio);
       const Result<PulseDevices> devices = devices_of(*audio_);
       if (!devices) return tl::unexpected(devices.error());
-      const Result<std::size_t> chosen = chosen_device(devices->sinks, params_.device);
+      const Result<std::size_t> chosen = chosen_device(devices->sinks, params_.device, "sink");
       if (!chosen) return tl::unexpected(chosen.error());
       RtAudio::StreamParameters to;
       to.deviceId = devices->ids[*chosen];
@@ -186,7 +186,7 @@ class PulseOutput final : public AudioOutput {
 
 }  // namespace
 
-Result<std::vector<OutputDevice>> output_devices() {
+Result<std::vector<SoundDevice>> output_devices() {
   try {
     const Result<std::unique_ptr<RtAudio>> audio = pulse();
     if (!audio) return tl::unexpected(audio.error());

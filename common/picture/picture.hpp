@@ -34,8 +34,8 @@ class Picture {
   void set(int x, int y, Colour colour);
   void fill(int x, int y, int width, int height, Colour colour);
   void paste(const Picture& other, int x, int y);
-  // ASCII letters become capitals, and characters without a glyph become a question mark. (x, y) is the upper left
-  // corner. `scale`: pixels for each dot of a glyph, which is 5 dots wide and 7 high.
+  // A character without a glyph, such as an umlaut, becomes a question mark. (x, y) is the upper left corner. `scale`:
+  // pixels for each dot of a glyph, which is 5 dots wide and 7 high.
   void text(int x, int y, std::string_view text, Colour colour, int scale = 1);
 
   // The bytes of a PNG file. Error: internal (memory).

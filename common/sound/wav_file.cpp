@@ -216,9 +216,40 @@ std::optional<float> sample_of(std::span<const float> frame, std::optional<Chann
   return sum / static_cast<float>(frame.size());
 }
 
+// Counts the frames in which a channel is clipped.
+class ClippedFrames {
+ public:
+  // A converter holds what it cannot measure at its last value: 127/128 for 8 bits. Others stop just below 1.
+  explicit ClippedFrames(int bits) : full_(bits == 8 ? 0.992F : 0.9999F) {}
+
+  void add(std::span<const float> frame, std::optional<Channel> channel) {
+    std::size_t first = 0, count = 1;  // without a choice all channels are equal
+    if (channel == Channel::mean)
+      count = frame.size();
+    else if (channel)
+      first = static_cast<std::size_t>(*channel) - 1;
+    bool held = false;
+    for (std::size_t i = 0; i < count; ++i) {
+      const float x = frame[first + i];
+      held |= std::abs(x) >= full_ && x == before_[i];
+      before_[i] = x;
+    }
+    // The frame at which it begins counts too.
+    count_ += held ? (held_ ? 1 : 2) : 0;
+    held_ = held;
+  }
+  [[nodiscard]] std::size_t count() const { return count_; }
+
+ private:
+  float full_;
+  std::array<float, kMostChannels> before_{};
+  bool held_ = false;
+  std::size_t count_ = 0;
+};
+
 // In blocks, so that an hour with many channels takes no more memory than the part of one that is kept.
 Result<std::vector<float>> read_samples(const fs::path& file, SNDFILE* in, const SF_INFO& info, const FrameRange& range,
-                                        std::optional<Channel> channel) {
+                                        std::optional<Channel> channel, ClippedFrames& clipped) {
   constexpr std::size_t kBlock = 65536;  // samples of all channels
   // More is no sound, but numbers for something else, and their squares would overflow.
   constexpr float kMost = 1e6F;
@@ -232,7 +263,8 @@ Result<std::vector<float>> read_samples(const fs::path& file, SNDFILE* in, const
     const auto wanted = std::min(static_cast<sf_count_t>(frames), range.count - std::ssize(samples));
     const sf_count_t got = sf_readf_float(in, block.data(), wanted);
     for (std::size_t i = 0; std::cmp_less(i, got); ++i) {
-      const auto x = sample_of(std::span(block).subspan(i * channels, channels), channel);
+      const std::span<const float> frame = std::span(block).subspan(i * channels, channels);
+      const auto x = sample_of(frame, channel);
       if (!x)
         return failure(ErrorCode::unsupported,
                        file.string() + ": NumChannels is " + std::to_string(channels) +
@@ -241,6 +273,7 @@ Result<std::vector<float>> read_samples(const fs::path& file, SNDFILE* in, const
         return bad_input(file.string() + ": sample " + std::to_string(range.first + std::ssize(samples)) + " is " +
                          (std::isnan(*x) ? "not a number" : "far beyond full scale") + "; export it again");
       samples.push_back(*x);
+      clipped.add(frame, channel);
     }
     if (got < wanted) break;
   }
@@ -276,7 +309,8 @@ Result<WavSound> read_wav(const fs::path& file, const WavPart& part) {
     info.frames = std::min(info.frames, static_cast<sf_count_t>(chunks->there / chunks->frame_bytes));
   const Result<FrameRange> range = checked_range(file, info, part);
   if (!range) return tl::unexpected(range.error());
-  auto samples = read_samples(file, in.get(), info, *range, part.channel);
+  ClippedFrames clipped(format->bits);
+  auto samples = read_samples(file, in.get(), info, *range, part.channel, clipped);
   if (!samples) return tl::unexpected(samples.error());
   if (std::cmp_less(samples->size(), range->count))
     return bad_input(file.string() + " is truncated: its data end too early; copy or record it again");
@@ -287,6 +321,7 @@ Result<WavSound> read_wav(const fs::path& file, const WavPart& part) {
                  .from_s = static_cast<double>(range->first) / info.samplerate,
                  .file_s = static_cast<double>(info.frames) / info.samplerate,
                  .announced_s = {},
+                 .clipped = clipped.count(),
                  .samples = std::move(*samples)};
   if (chunks->announced > chunks->there && chunks->frame_bytes > 0) {
     const double frames = static_cast<double>(chunks->announced) / static_cast<double>(chunks->frame_bytes);

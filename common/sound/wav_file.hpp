@@ -1,5 +1,6 @@
 // Recordings as WAV files (Figure 8.4).
 #pragma once
+#include <cstddef>
 #include <filesystem>
 #include <optional>
 #include <span>
@@ -31,7 +32,10 @@ struct WavSound {
   double from_s = 0;                       // of the file, at which the samples begin
   double file_s = 0;                       // of sound in the file
   std::optional<double> announced_s = {};  // what its header says, if that is more; 0 if it says nothing
-  std::vector<float> samples;              // of one channel, or of the mean of all; 1 is full scale
+  // Frames of the part in which a channel that counts stays at full scale, from one sample to the next. One sample
+  // alone may be the peak of a recording that was made as loud as possible.
+  std::size_t clipped = 0;
+  std::vector<float> samples;  // of one channel, or of the mean of all; 1 is full scale
 
   [[nodiscard]] double seconds() const { return static_cast<double>(samples.size()) / rate_hz; }
 };

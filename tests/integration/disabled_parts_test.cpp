@@ -6,6 +6,7 @@
 #include <QDockWidget>
 #include <QLabel>
 #include <QMenu>
+#include <QPushButton>
 #include <QSettings>
 #include <QSlider>
 #include <QStatusBar>
@@ -174,6 +175,26 @@ TEST_F(DisabledParts, TheSoundDialogSaysWhyTheVolumeCannotBeSet) {
   EXPECT_FALSE(volume->isEnabled());
   EXPECT_EQ(volume->toolTip().toStdString(), kOff);
   trigger("sound");  // for the next window
+}
+
+// A room that others run has no audio client of the window's. The dialog gives the command that plays it.
+TEST_F(DisabledParts, TheSoundDialogSaysWhatPlaysARoomOfOthers) {
+  const std::string says = "The window plays only the rooms that it opened. To hear this one, start: osteon-audio ";
+  trigger("sound_settings");
+  auto* dialog = window_->findChild<SoundDialog*>("sound_dialog");
+  ASSERT_TRUE(QTest::qWaitForWindowExposed(dialog));
+  window_->join({"127.0.0.1:1", "Ada's knee", {}, {}});
+  EXPECT_EQ(label("sound_trouble").toStdString(), says + "--server 127.0.0.1:1 --room 'Ada'\\''s knee' --plain");
+  window_->join({"127.0.0.1:1", "", {}, {"/home/ben/mine", "/home/ben/a ticket"}});
+  const std::string secure = says + "--server 127.0.0.1:1 --certificates /home/ben/mine --ticket '/home/ben/a ticket'";
+  EXPECT_EQ(label("sound_trouble").toStdString(), secure);
+  // Who switches the sound on there reads it at once. The status bar may be too narrow, and its tool tip has it all.
+  trigger("sound");
+  EXPECT_NE(window_->statusBar()->toolTip().toStdString(), secure);
+  trigger("sound");
+  EXPECT_EQ(window_->statusBar()->toolTip().toStdString(), secure);
+  window_->findChild<QPushButton*>("cancel")->click();
+  EXPECT_EQ(label("sound_trouble"), "Only a practice room has sound. Open a bone first.");
 }
 
 }  // namespace

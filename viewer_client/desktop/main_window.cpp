@@ -335,6 +335,7 @@ void MainWindow::room_opened(const QString& address) {
 void MainWindow::join(const RoomAddress& room) {
   leave_room();
   own_name_ = room.name;  // that of the user's haptic client, if there is one
+  sound_control_->join(listening_command(room.address, room.room, room.credentials));
   start_->show_work(tr("Joining the room at %1").arg(room.address));
   enter_room(room);
   enable_room_actions(false);

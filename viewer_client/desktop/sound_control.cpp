@@ -1,5 +1,6 @@
 #include "viewer_client/desktop/sound_control.hpp"
 
+#include <QRegularExpression>
 #include <QSettings>
 #include <algorithm>
 #include <utility>
@@ -9,7 +10,22 @@ namespace osteon {
 namespace {
 constexpr const char* kOnKey = "sound/on";
 constexpr const char* kVolumeKey = "sound/volume";  // percent
+
+// As a shell reads it as one word.
+QString shell_word(const QString& text) {
+  static const QRegularExpression special("[^A-Za-z0-9_./:=,@%+-]");
+  if (!text.isEmpty() && !text.contains(special)) return text;
+  return "'" + QString(text).replace("'", "'\\''") + "'";
+}
 }  // namespace
+
+QString listening_command(const QString& address, const QString& room, const wire::ClientCredentials& credentials) {
+  QString command = "osteon-audio --server " + shell_word(address);
+  if (!room.isEmpty()) command += " --room " + shell_word(room);
+  if (credentials.certificates.empty()) return command + " --plain";
+  return command + " --certificates " + shell_word(QString::fromStdString(credentials.certificates.string())) +
+         " --ticket " + shell_word(QString::fromStdString(credentials.ticket.string()));
+}
 
 SoundControl::SoundControl(Events events, QWidget* window)
     : QObject(window), events_(std::move(events)), window_(window) {
@@ -25,8 +41,14 @@ Result<void> SoundControl::listen(const std::filesystem::path& socket) {
   return {};
 }
 
+void SoundControl::join(const QString& command) {
+  command_ = command;
+  refresh();
+}
+
 void SoundControl::close() {
   server_.reset();
+  command_.clear();
   trouble_.clear();
   refresh();
 }
@@ -39,6 +61,7 @@ void SoundControl::choose(const SoundDialog::Chosen& chosen) {
   settings.setValue(kVolumeKey, chosen_.percent);
   send();
   if (switched) events_.switched(chosen_.on);
+  if (switched && chosen_.on && !command_.isEmpty()) events_.notice(missing());
 }
 
 void SoundControl::set_on(bool on) {
@@ -71,6 +94,8 @@ void SoundControl::refresh() {
 }
 
 QString SoundControl::missing() const {
+  if (!command_.isEmpty())
+    return tr("The window plays only the rooms that it opened. To hear this one, start: %1").arg(command_);
   if (!server_) return tr("Only a practice room has sound. Open a bone first.");
   return chosen_.on ? tr("The audio client has not reported yet.") : tr("The sound is off.");
 }

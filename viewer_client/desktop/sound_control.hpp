@@ -8,9 +8,14 @@
 #include <optional>
 
 #include "common/input/sound_link.hpp"
+#include "common/wire/credentials.hpp"
 #include "viewer_client/desktop/sound_dialog.hpp"
 
 namespace osteon {
+
+// The command by which osteon-audio plays a room that others run, with the window's own way to its server.
+[[nodiscard]] QString listening_command(const QString& address, const QString& room,
+                                        const wire::ClientCredentials& credentials);
 
 // [GUI thread]
 class SoundControl : public QObject {
@@ -26,7 +31,9 @@ class SoundControl : public QObject {
 
   // Makes the socket for the audio client of the next room. Errors: those of SoundServer::listen().
   [[nodiscard]] Result<void> listen(const std::filesystem::path& socket);
-  void close();  // removes the socket
+  // The next room is one that others run. `command`: what plays it, for the user to start.
+  void join(const QString& command);
+  void close();  // removes the socket, and forgets the command
   [[nodiscard]] bool on() const { return chosen_.on; }
   void set_on(bool on);
   void show_dialog();
@@ -44,6 +51,7 @@ class SoundControl : public QObject {
   QWidget* window_;
   SoundDialog::Chosen chosen_;
   std::unique_ptr<SoundServer> server_;
+  QString command_;                // of a room that others run; empty: in no such room
   SoundDialog* dialog_ = nullptr;  // the window's
   std::string trouble_;            // the one that notice got last
 };

@@ -111,6 +111,7 @@ SoundDialog::SoundDialog(const Chosen& chosen, std::function<void(const Chosen&)
   trouble_ = new QLabel;
   trouble_->setObjectName("sound_trouble");
   trouble_->setWordWrap(true);
+  trouble_->setTextInteractionFlags(Qt::TextSelectableByMouse);  // it may have a command
   auto* buttons = new QDialogButtonBox;
   QPushButton* close = buttons->addButton(tr("Close"), QDialogButtonBox::RejectRole);
   connect(close, &QPushButton::clicked, this, [this] { reject(); });

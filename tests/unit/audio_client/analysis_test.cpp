@@ -296,6 +296,20 @@ TEST(SoundAnalysis, NamesOfLinesBeyondTheAxisAreNotWritten) {
   EXPECT_EQ(ink_at_the_right(fast), 0);
 }
 
+// In psd.png they all may lie on each other. Only one is a grey, and another black.
+TEST(SoundAnalysis, NoTwoCurvesHaveNearlyOneColour) {
+  std::vector<picture::Colour> colours{kWholeColour};
+  for (std::size_t i = 0; i < sound::kDrillingStates; ++i)
+    colours.push_back(colour_of(static_cast<sound::DrillingState>(i)));
+  const auto grey = [](picture::Colour c) { return c.red == c.green && c.green == c.blue; };
+  for (std::size_t i = 0; i < colours.size(); ++i)
+    for (std::size_t j = 0; j < i; ++j) {
+      const picture::Colour a = colours[i], b = colours[j];
+      const double apart = std::hypot(a.red - b.red, a.green - b.green, a.blue - b.blue);
+      EXPECT_GT(apart, grey(a) && grey(b) ? 150 : 60) << i << " and " << j;
+    }
+}
+
 // At the first file, in the middle, and when all files are there.
 TEST(WriteAnalysis, AStopLeavesNothing) {
   const SoundAnalysis analysis = analyse({.rate_hz = kAnalysisRate_hz, .samples = noise_with(0.1, {}, 1.0)}, {});
@@ -463,6 +477,13 @@ TEST_F(AnalyseProgram, ThePicturesShowTheirCurves) {
   EXPECT_GT(png_of(temp_ / "out/waveform.png").count(kSignal), 5000);
   EXPECT_GT(png_of(temp_ / "out/bands.png").count(kSignal), 12 * 2000);
   EXPECT_GT(png_of(temp_ / "out/bands.png").count(kDepth), 13 * 500);
+  // Each band has the displacement's axis at its right, and the first panel, the displacement itself, has none.
+  const Png bands = png_of(temp_ / "out/bands.png");
+  for (int panel = 0; panel < 13; ++panel) {
+    int axis = 0;
+    for (int y = 24 + 134 * panel; y < 24 + 134 * panel + 84; ++y) axis += bands.at(1100 - 44, y) == kDepth;
+    EXPECT_EQ(axis, panel == 0 ? 0 : 84) << panel;
+  }
   EXPECT_GT(png_of(temp_ / "out/packets.png").count(kSignal), 2000);
   EXPECT_GT(png_of(temp_ / "out/psd.png").count(kFree), 1000);
   EXPECT_GT(png_of(temp_ / "out/psd.png").count(kCortical), 1000);

@@ -153,11 +153,19 @@ TEST_F(RecordCommand, AFullDiskKeepsWhatCame) {
   EXPECT_EQ(std::distance(std::filesystem::directory_iterator(temp_.path()), {}), 1);
 }
 
-TEST_F(RecordCommand, NamesTheSourcesThatAreThere) {
+TEST_F(RecordCommand, SaysWhereTheSourcesAreListed) {
   const auto ran = record({file(), "--seconds", "1", "--device", "theatre 7"});
   EXPECT_EQ(ran.exit_code, 1);
-  EXPECT_THAT(ran.err, AllOf(HasSubstr("no source of sound named theatre 7"), HasSubstr("Monitor of Null Output")));
+  EXPECT_THAT(ran.err, AllOf(HasSubstr("there is no source \"theatre 7\""), HasSubstr("osteon-audio devices")));
   EXPECT_FALSE(std::filesystem::exists(file()));
+  const auto listed = test::run(test::program("osteon-audio"), {"devices"});
+  EXPECT_EQ(listed.exit_code, 0) << listed.err;
+  const std::string& text = listed.out;
+  const std::size_t sources = text.find("sources, to record from:\n");
+  ASSERT_NE(sources, std::string::npos) << text;
+  EXPECT_TRUE(text.starts_with("sinks, to play to:\n"));
+  EXPECT_THAT(text.substr(0, sources), AllOf(HasSubstr("Hz  Null Output\n"), testing::Not(HasSubstr("Monitor"))));
+  EXPECT_THAT(text.substr(sources), HasSubstr("*  0   2 channels   48000 Hz  Monitor of Null Output\n"));
 }
 
 TEST_F(RecordCommand, SaysThatNoServerAnswers) {

@@ -78,6 +78,39 @@ TEST_F(ModelProgram, ModelsThePartThatIsAskedFor) {
   EXPECT_NEAR(sound->seconds(), 1.25, 0.001);
 }
 
+// Whatever is made of a recording, its user hears what is wrong with it.
+TEST_F(ModelProgram, SaysWhatIsWrongWithTheRecording) {
+  std::mt19937 random(2);
+  std::normal_distribution<float> noise(0.0F, 0.02F);
+  std::vector<float> loud;
+  for (int i = 0; i < 88200; ++i)
+    loud.push_back(2.0F * static_cast<float>(std::sin(0.2 * static_cast<double>(i))) + noise(random));
+  ASSERT_TRUE(sound::write_wav(temp_ / "loud.wav", loud, 44100));
+  const auto put = [&](const char* name, const std::string& bytes) {
+    std::ofstream(temp_ / name, std::ios::binary) << bytes;
+    return path(name);
+  };
+  const std::string good = test::content(wav());
+  std::string coarse = good;
+  coarse[34] = 8, coarse[32] = 1;  // BitsPerSample, BlockAlign
+  const std::string cut = put("cut.wav", good.substr(0, 44 + 2 * 44100)), eight = put("eight.wav", coarse);
+  for (const std::vector<std::string>& command : std::vector<std::vector<std::string>>{
+           {"analyse"}, {"model", "--refine", "0"}, {"preset", "--out", path("a.yaml"), "--rpm", "1400"}}) {
+    const auto said = [&](const std::string& file) {
+      std::vector<std::string> arguments = command;
+      arguments.push_back(file);
+      const test::RunResult result = run(arguments);
+      EXPECT_EQ(result.exit_code, 0) << command.front() << ": " << result.err;
+      return result.out;
+    };
+    EXPECT_THAT(said(cut), testing::HasSubstr("note       the header announces 2 s; 1 s are there\n"));
+    EXPECT_THAT(said(eight), testing::HasSubstr("note       8 bits: their quantisation noise"));
+    // Beyond full scale for two thirds of the time.
+    EXPECT_THAT(said(path("loud.wav")), testing::ContainsRegex("note       5[89][0-9]* samples .67 %. stay at full"));
+    EXPECT_THAT(said(wav().string()), testing::Not(testing::HasSubstr("note")));
+  }
+}
+
 TEST_F(ModelProgram, WrongUseIsOneSentenceEach) {
   ASSERT_EQ(run({"model", wav().string(), "--out", path("a.model")}).exit_code, 0);
   const std::string whole = test::content(temp_ / "a.model");

@@ -201,6 +201,7 @@ TEST(PulseOutput, TheSinkIsListedAndChosenByItsName) {
   ASSERT_TRUE((*output)->start());
   EXPECT_TRUE(test::wait_until([&] { return source.frames > 4800; }, 30s));
   (*output)->stop();
+  EXPECT_TRUE(open_output({.kind = OutputKind::pulse, .device = "Null"}, source)) << "a part of the name";
   const auto none = open_output({.kind = OutputKind::pulse, .device = "Concert hall"}, source);
   ASSERT_FALSE(none);
   EXPECT_EQ(none.error().code, ErrorCode::invalid_input);

@@ -286,25 +286,37 @@ TEST(PulseOutput, MissingSoundServerIsOneSentenceWithTheRemedy) {
   EXPECT_EQ(devices.error().code, ErrorCode::unavailable);
 }
 
-TEST(OutputDevice, IsChosenByNameByNumberOrByTheServer) {
-  const std::vector<OutputDevice> sinks{{"Screen", 2, 48000, false},
-                                        {"Desk", 2, 44100, true},
-                                        {"1", 2, 48000, false},
-                                        {"Twin", 2, 48000, false},
-                                        {"Twin", 6, 48000, false}};
-  EXPECT_EQ(*chosen_device(sinks, ""), 1U);
-  EXPECT_EQ(*chosen_device(sinks, "Screen"), 0U);
-  EXPECT_EQ(*chosen_device(sinks, "4"), 4U);
-  EXPECT_EQ(*chosen_device(sinks, "1"), 2U) << "a name counts before a number";
-  EXPECT_EQ(*chosen_device({sinks.front()}, ""), 0U) << "no default";
-  for (const char* wrong : {"Twin", "5", "-1", "0x", "desk", " "}) {
-    const auto refused = chosen_device(sinks, wrong);
+TEST(SoundDevice, IsChosenByNameByNumberByAPartOrByTheServer) {
+  const std::vector<SoundDevice> sinks{{"Screen", 2, 48000, false},
+                                       {"Desk", 2, 44100, true},
+                                       {"1", 2, 48000, false},
+                                       {"Twin", 2, 48000, false},
+                                       {"Twin", 6, 48000, false},
+                                       {"USB Audio 7 Analog", 2, 48000, false},
+                                       {"USB Audio 8 Digital", 2, 48000, false}};
+  const auto chosen = [&](const char* wanted) {
+    const auto found = chosen_device(sinks, wanted, "sink");
+    EXPECT_TRUE(found) << wanted << ": " << (found ? "" : found.error().message);
+    return found.value_or(99);
+  };
+  EXPECT_EQ(chosen(""), 1U);
+  EXPECT_EQ(chosen("Screen"), 0U);
+  EXPECT_EQ(chosen("4"), 4U);
+  EXPECT_EQ(chosen("1"), 2U) << "a name counts before a number";
+  EXPECT_EQ(chosen("USB Audio 8"), 6U) << "a part that no other has";
+  EXPECT_EQ(chosen("Analog"), 5U);
+  EXPECT_EQ(chosen("7"), 5U) << "no number of a sink, but a part";
+  EXPECT_EQ(*chosen_device({sinks.front()}, "", "sink"), 0U) << "no default";
+  for (const char* wrong : {"Twin", "Twi", "USB Audio", "77", "-1", "0x", "desk", "Analog 7"}) {
+    const auto refused = chosen_device(sinks, wrong, "sink");
     ASSERT_FALSE(refused) << wrong;
     EXPECT_EQ(refused.error().code, ErrorCode::invalid_input);
     EXPECT_THAT(refused.error().message,
                 testing::AllOf(testing::HasSubstr(wrong), testing::HasSubstr("osteon-audio devices")));
   }
-  EXPECT_FALSE(chosen_device({}, ""));
+  const auto none = chosen_device({}, "", "source");
+  ASSERT_FALSE(none);
+  EXPECT_THAT(none.error().message, testing::HasSubstr("has no source"));
 }
 
 TEST(OutputKind, UnknownNamesAreRefusedWithTheChoice) {

@@ -2,6 +2,8 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <set>
+#include <string>
 #include <vector>
 
 #include "audio_client/analysis/plot.hpp"
@@ -100,6 +102,40 @@ TEST_F(PlotTest, TheGridIsAtRoundNumbers) {
   EXPECT_FALSE(grid(110, 30));
   EXPECT_TRUE(grid(110, 45));
   EXPECT_FALSE(grid(110, 50));
+}
+
+// From 0 below to 20 above, on 51 rows. 101 pixels wide, the frame ends at column 161.
+TEST_F(PlotTest, ASecondAxisHasItsNumbersAtTheRight) {
+  plot_.right_axis({0.0, 20.0, "mm"}, kCurve);
+  for (int y = 20; y <= 70; ++y) EXPECT_EQ(page_.at(161, y), kCurve) << y;
+  for (const int tick : {20, 45, 70}) EXPECT_EQ(page_.at(164, tick), kCurve) << "0, 10 and 20: " << tick;
+  for (const int between : {30, 57}) EXPECT_NE(page_.at(164, between), kCurve) << between;
+  const auto inked = [&](int from_x, int to_x, int from_y, int to_y) {
+    for (int x = from_x; x < to_x; ++x)
+      for (int y = from_y; y < to_y; ++y)
+        if (page_.at(x, y) == kCurve) return true;
+    return false;
+  };
+  EXPECT_TRUE(inked(168, 173, 67, 74)) << "0";
+  EXPECT_TRUE(inked(174, 179, 17, 24)) << "the second digit of 20";
+  EXPECT_TRUE(inked(190, 200, 8, 15) && !inked(161, 190, 8, 15)) << "the label ends 44 pixels behind the frame";
+}
+
+// A unit is another one in capitals: mm and Mm, s and S.
+TEST(PictureText, SmallLettersAreNoCapitals) {
+  const auto drawn = [](const std::string& text) {
+    Picture page(12, 9, kPaper);
+    page.text(0, 0, text, kInk);
+    std::vector<int> dots;
+    for (int y = 0; y < page.height(); ++y)
+      for (int x = 0; x < page.width(); ++x) dots.push_back(page.at(x, y) == kInk ? 1 : 0);
+    return dots;
+  };
+  std::set<std::vector<int>> seen{drawn("?")};
+  for (char letter = 'a'; letter <= 'z'; ++letter) {
+    EXPECT_TRUE(seen.insert(drawn({letter})).second) << letter;
+    EXPECT_TRUE(seen.insert(drawn({static_cast<char>(letter - 'a' + 'A')})).second) << letter << " as a capital";
+  }
 }
 
 TEST(Heat, RisesInBrightness) {

@@ -12,6 +12,7 @@
 #include <filesystem>
 #include <fstream>
 #include <limits>
+#include <numbers>
 #include <random>
 #include <set>
 #include <string>
@@ -69,6 +70,33 @@ TEST(WavFile, BeyondFullScaleIsClipped) {
   const auto read = read_wav(temp / "a.wav");
   ASSERT_TRUE(read) << read.error().message;
   EXPECT_NEAR(read->samples[100], 1.0F, 1e-4F);
+}
+
+// A sine of amplitude A stays beyond 1 for 1 - 2 asin(1 / A) / pi of the time. One sample at full scale is no clipping.
+TEST(WavFile, CountsWhatIsClipped) {
+  const test::TempDir temp;
+  const std::vector<float> loud = tone(110, 2.0, 44100, 44100), quiet = tone(110, 0.9, 44100, 44100);
+  std::vector<float> both, peak = quiet;
+  for (std::size_t i = 0; i < loud.size(); ++i)
+    both.push_back(std::clamp(loud[i], -1.0F, 1.0F)), both.push_back(quiet[i]);
+  peak[500] = 1.0F, peak[9000] = -1.0F;
+  const double wanted = 44100 * (1 - 2 * std::asin(1 / 2.0) / std::numbers::pi);
+  for (const int format : {SF_FORMAT_WAV | SF_FORMAT_PCM_U8, kPcm16, SF_FORMAT_WAV | SF_FORMAT_PCM_24, kFloat}) {
+    write_foreign(temp / "a.wav", format, 2, 44100, both);
+    const auto clipped = [&](const char* file, Channel channel, double from_s = 0) {
+      const auto read = read_wav(temp / file, {.channel = channel, .from_s = from_s});
+      return read ? static_cast<double>(read->clipped) : -1.0;
+    };
+    // The sine is beyond 1 in 220 half waves. Both edges of each are between two samples, and 8 bits round a little
+    // more to the last value.
+    const double rounded = 2 * 220;
+    EXPECT_NEAR(clipped("a.wav", Channel::left), wanted, rounded);
+    EXPECT_EQ(clipped("a.wav", Channel::right), 0);
+    EXPECT_NEAR(clipped("a.wav", Channel::mean), wanted, rounded) << "one of its channels";
+    EXPECT_NEAR(clipped("a.wav", Channel::left, 0.5), wanted / 2, rounded) << "of the part";
+    write_foreign(temp / "peak.wav", format, 1, 44100, peak);
+    EXPECT_EQ(clipped("peak.wav", Channel::left), 0);
+  }
 }
 
 TEST(WavFile, DepthsAndChannels) {

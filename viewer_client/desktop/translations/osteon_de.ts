@@ -1197,6 +1197,10 @@
         <translation>Es gibt keinen Ton: %1</translation>
     </message>
     <message>
+        <source>The window plays only the rooms that it opened. To hear this one, start: %1</source>
+        <translation>Nur Räume, die das Fenster geöffnet hat, spielt es selbst. Für diesen starten Sie: %1</translation>
+    </message>
+    <message>
         <source>Only a practice room has sound. Open a bone first.</source>
         <translation>Ton gibt es nur in einem Übungsraum. Öffnen Sie zuerst einen Knochen.</translation>
     </message>
