@@ -1,5 +1,6 @@
 #include "viewer_client/net/held_bone.hpp"
 
+#include <mutex>
 #include <thread>
 #include <utility>
 
@@ -22,6 +23,7 @@ struct HeldBone::Impl {
   HeldBoneStatus status OSTEON_GUARDED_BY(mutex);
 
   std::thread thread;
+  std::once_flag thread_joined;
 
   void run();
   // True: the bone was fetched.
@@ -136,9 +138,11 @@ std::unique_ptr<HeldBone> HeldBone::start(std::unique_ptr<FieldSource> source, c
   return bone;
 }
 
-HeldBone::~HeldBone() {
+HeldBone::~HeldBone() { end_and_join(); }
+
+void HeldBone::end_and_join() {
   end();
-  impl_->thread.join();
+  std::call_once(impl_->thread_joined, [this] { impl_->thread.join(); });
 }
 
 void HeldBone::end() {

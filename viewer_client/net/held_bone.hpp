@@ -60,6 +60,8 @@ class HeldBone {
   ~HeldBone();
   // Ends the stream; the bone stays as it is. Returns at once.
   void end();
+  // Also waits for the thread, which then uses the source no more. Whoever shares the bone may go on to read it.
+  void end_and_join();
 
   [[nodiscard]] HeldBoneStatus status() const;
   // Calls `use` with the bone at one event. Cuts wait meanwhile, and so does end(). `use` may take no lock but leaves.

@@ -72,6 +72,27 @@ TEST_F(ServedField, WhoComesLateWhileTwoHandsCutEndsWithTheRoomsBone) {
   EXPECT_EQ(viewer.held_bone(), nullptr);
 }
 
+TEST_F(ServedField, WhatIsSwitchedOffEndsAlthoughSomebodySharesIt) {
+  RenderQueue queue;
+  auto joined = RoomSubscription::start({.address = address(), .cache = dir_ / "viewers"}, queue, [] { return false; });
+  ASSERT_TRUE(joined) << joined.error().message;
+  const auto follows = [](const HeldBoneStatus& now) { return now.state == HeldBoneState::follows; };
+  (*joined)->hold_bone(true);
+  const auto older = (*joined)->held_bone();
+  ASSERT_TRUE(older->wait(follows, kPatience));
+  (*joined)->hold_bone(false);
+  (*joined)->hold_bone(true);
+  const auto newer = (*joined)->held_bone();
+  ASSERT_NE(newer, older);
+  ASSERT_TRUE(newer->wait(follows, kPatience));
+  // Else the two would replace each other: the server gives an author one stream.
+  EXPECT_FALSE(older->wait([](const HeldBoneStatus& now) { return now.asked_again > 0; }, 1s));
+  EXPECT_EQ(newer->status().asked_again, 0u);
+  joined->reset();
+  for (const auto& bone : {older, newer})
+    EXPECT_TRUE(bone->read([&](const Replica& held) { EXPECT_EQ(held.hash(), runtime().bone_status().field_hash); }));
+}
+
 TEST_F(ServedField, ANewerStreamOfAViewerReplacesTheOneBefore) {
   const wire::JoinedRoom room = join(address(), wire::ClientKind::viewer);
   v1::WatchFieldRequest request;
