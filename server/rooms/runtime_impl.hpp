@@ -98,6 +98,8 @@ struct RoomRuntime::Impl {
   void close_room(const Error& why);
   [[nodiscard]] std::optional<Error> closed() const;
   void end_sessions(const std::string& why, bool to_return = false);
+  // As the open streams were. False: they go on.
+  bool ends(FieldSubscriber& reader) const OSTEON_REQUIRES(sessions_mutex);
   void show_scene();
   void read_leaves(std::vector<FieldLeaf>& leaves);
 

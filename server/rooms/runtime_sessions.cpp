@@ -180,7 +180,12 @@ void RoomRuntime::Impl::end_sessions(const std::string& why, bool to_return) {
   ended = why;
   may_return = to_return;
   sessions.each([&](SessionSubscriber& subscriber) { to_return ? subscriber.replaced(why) : subscriber.end(why); });
-  field_readers.each([&](FieldSubscriber& reader) { reader.end(why); });
+  field_readers.each([&](FieldSubscriber& reader) { ends(reader); });
+}
+
+bool RoomRuntime::Impl::ends(FieldSubscriber& reader) const {
+  if (ended) may_return ? reader.replaced(*ended) : reader.end(*ended);
+  return ended.has_value();
 }
 
 Result<void> RoomRuntime::check_witness(const Witness& kept) {
@@ -339,6 +344,7 @@ Result<void> RoomRuntime::watch_field(const std::shared_ptr<FieldSubscriber>& re
     leaves = impl_->places_of_leaves();
     SessionStart start = impl_->start_of_field();
     const MutexLock lock(impl_->sessions_mutex);
+    if (impl_->ends(*reader)) return {};
     FieldSubscriber* before = nullptr;
     impl_->field_readers.each([&](FieldSubscriber& one) {
       if (one.author() == reader->author()) before = &one;
@@ -347,14 +353,13 @@ Result<void> RoomRuntime::watch_field(const std::shared_ptr<FieldSubscriber>& re
       return failure(ErrorCode::exhausted, std::to_string(kMostFieldReaders) +
                                                " viewers show the inside of this bone already; close one of them");
     if (before) {
-      before->end("another connection of the same viewer has replaced it");
+      before->replaced("another connection of the same viewer has replaced it");
       impl_->field_readers.remove(*before);
     } else {
       impl_->people.came(reader->author());
     }
     impl_->field_readers.add(*reader);
     reader->begin(std::move(start));
-    if (impl_->ended) reader->end(*impl_->ended);
   }
   impl_->give_leaves(*this, reader, std::move(leaves));
   return {};

@@ -61,7 +61,8 @@ class FieldStream final : public OutStream<WriteReactor>, public FieldSubscriber
                                                       std::to_string(SessionSendQueue::kMaxEntries) +
                                                       " events behind the room; ask again"});
   }
-  void end(const std::string& why) override { close({StatusCode::UNAVAILABLE, why}); }
+  void end(const std::string& why) override { close({StatusCode::ABORTED, why}); }
+  void replaced(const std::string& why) override { close({StatusCode::UNAVAILABLE, why}); }
   std::size_t waiting() const override {
     const MutexLock lock(mutex_);
     return send_queue_.waiting();

@@ -66,12 +66,13 @@ class ServerField final : public FieldSource {
                 true};
       case grpc::StatusCode::FAILED_PRECONDITION:
         return {{ErrorCode::unsupported, said}, true};
+      case grpc::StatusCode::ABORTED:  // the room cannot go on
+        return {{ErrorCode::unavailable, said}, true};
       case grpc::StatusCode::PERMISSION_DENIED:
       case grpc::StatusCode::UNAUTHENTICATED:
         return {{ErrorCode::denied, said}, stays_refused()};
       case grpc::StatusCode::INVALID_ARGUMENT:
       case grpc::StatusCode::NOT_FOUND:
-      case grpc::StatusCode::ABORTED:
         return {{ErrorCode::unavailable, said}, stays_refused()};
       default:
         return {{ErrorCode::unavailable, said}};

@@ -113,6 +113,20 @@ TEST_F(ServedField, ANewerStreamOfAViewerReplacesTheOneBefore) {
   (void)newer->Finish();
 }
 
+TEST_F(ServedField, AsksAgainWhileTheRoomMayComeBackAndNeverAfterItsEnd) {
+  const wire::JoinedRoom room = join(address(), wire::ClientKind::viewer);
+  const auto held = HeldBone::start(field_of_server({.room = [=] { return room; }, .cache = dir_ / "viewers"}),
+                                    {.pause = 5ms, .longest_pause = 20ms});
+  ASSERT_TRUE(held->wait([](const HeldBoneStatus& now) { return now.state == HeldBoneState::follows; }, kPatience));
+  runtime().send_away("the server stops for a moment");
+  ASSERT_TRUE(held->wait(
+      [](const HeldBoneStatus& now) { return now.state == HeldBoneState::interrupted && now.asked_again > 2; },
+      kPatience));
+  runtime().end_streams("the room takes no more cuts");
+  ASSERT_TRUE(held->wait([](const HeldBoneStatus& now) { return now.state == HeldBoneState::failed; }, kPatience));
+  EXPECT_EQ(held->status().why->message, "the room takes no more cuts");
+}
+
 TEST_F(ServedField, SoManyMayReadAtOnce) {
   const wire::JoinedRoom last = join(address(), wire::ClientKind::viewer);
   struct Open {

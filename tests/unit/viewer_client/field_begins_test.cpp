@@ -1,0 +1,65 @@
+// How the field's stream begins in a room with a journal on a slow disk, and whether it begins at all.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cerrno>
+#include <memory>
+#include <optional>
+#include <utility>
+
+#include "server/storage/room_store.hpp"
+#include "tests/support/disk/memory_disk.hpp"
+#include "tests/unit/viewer_client/followed_room.hpp"
+
+namespace osteon {
+namespace {
+
+using test::FollowedRoom;
+using testing::HasSubstr;
+
+class FieldBegins : public testing::Test {
+ protected:
+  void SetUp() override {
+    RoomStore::Options options;
+    options.name = "femur";
+    options.journal.disk = &disk_;
+    Result<PersistedRoom> kept = RoomStore::open("/rooms/femur", bone_, options);
+    ASSERT_TRUE(kept) << kept.error().message;
+    store_ = std::move(kept->store);
+    room_.emplace(std::move(kept->room), store_.get());
+  }
+
+  const Case bone_ = test::test_block();
+  test::MemoryDisk disk_{1};
+  std::unique_ptr<RoomStore> store_;
+  std::optional<FollowedRoom> room_;
+};
+
+TEST_F(FieldBegins, AFailedJournalEndsReadersAndCopiesNothingForNewOnes) {
+  room_->cut(3);
+  const auto open = room_->open();
+  room_->tick();
+  EXPECT_TRUE(open->given_leaves());
+  disk_.fail_sync_at(1, EIO, test::MemoryDisk::Lasting::from_then_on);
+  room_->cut(1);
+  room_->tick();
+  EXPECT_THAT(open->ended(), HasSubstr("the room takes no more cuts"));
+  EXPECT_FALSE(open->may_return());
+  const auto late = room_->open();
+  room_->tick();
+  EXPECT_EQ(late->ended(), open->ended());
+  EXPECT_FALSE(late->may_return());
+  EXPECT_FALSE(late->begun() || late->given_leaves()) << "nobody would be sent it";
+}
+
+TEST_F(FieldBegins, WhoIsSentAwayMayReturn) {
+  const auto open = room_->open();
+  room_->runtime().send_away("the server stops for a moment");
+  EXPECT_TRUE(open->may_return());
+  const auto late = room_->open();
+  EXPECT_TRUE(late->may_return());
+  EXPECT_FALSE(late->begun());
+}
+
+}  // namespace
+}  // namespace osteon
