@@ -188,6 +188,17 @@ bool RoomRuntime::Impl::ends(FieldSubscriber& reader) const {
   return ended.has_value();
 }
 
+Result<FieldSubscriber*> RoomRuntime::Impl::place_for(const FieldSubscriber& reader) const {
+  FieldSubscriber* before = nullptr;
+  field_readers.each([&](FieldSubscriber& one) {
+    if (one.author() == reader.author()) before = &one;
+  });
+  if (!before && field_readers.size() >= kMostFieldReaders)
+    return failure(ErrorCode::exhausted, std::to_string(kMostFieldReaders) +
+                                             " viewers show the inside of this bone already; close one of them");
+  return before;
+}
+
 Result<void> RoomRuntime::check_witness(const Witness& kept) {
   if (impl_->player) return {};
   if (impl_->store) return impl_->store->check_witness(kept);
@@ -337,6 +348,12 @@ Result<void> RoomRuntime::watch_field(const std::shared_ptr<FieldSubscriber>& re
   if (impl_->player)
     return failure(ErrorCode::unavailable,
                    "this room shows what happened in another: it sends its surface and not the inside of its bone");
+  {
+    // Whoever asks in vain costs no work under the room's lock.
+    const MutexLock lock(impl_->sessions_mutex);
+    if (impl_->ends(*reader)) return {};
+    if (const Result<FieldSubscriber*> place = impl_->place_for(*reader); !place) return tl::unexpected(place.error());
+  }
   std::vector<FieldLeaf> leaves;
   {
     // Held until the reader is in the list, as for sessions.
@@ -345,16 +362,11 @@ Result<void> RoomRuntime::watch_field(const std::shared_ptr<FieldSubscriber>& re
     SessionStart start = impl_->start_of_field();
     const MutexLock lock(impl_->sessions_mutex);
     if (impl_->ends(*reader)) return {};
-    FieldSubscriber* before = nullptr;
-    impl_->field_readers.each([&](FieldSubscriber& one) {
-      if (one.author() == reader->author()) before = &one;
-    });
-    if (!before && impl_->field_readers.size() >= kMostFieldReaders)
-      return failure(ErrorCode::exhausted, std::to_string(kMostFieldReaders) +
-                                               " viewers show the inside of this bone already; close one of them");
-    if (before) {
-      before->replaced("another connection of the same viewer has replaced it");
-      impl_->field_readers.remove(*before);
+    const Result<FieldSubscriber*> before = impl_->place_for(*reader);
+    if (!before) return tl::unexpected(before.error());
+    if (*before) {
+      (*before)->replaced("another connection of the same viewer has replaced it");
+      impl_->field_readers.remove(**before);
     } else {
       impl_->people.came(reader->author());
     }

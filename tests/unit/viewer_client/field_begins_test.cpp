@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <cerrno>
+#include <chrono>
+#include <future>
 #include <memory>
 #include <optional>
 #include <utility>
@@ -14,6 +16,8 @@
 namespace osteon {
 namespace {
 
+using namespace std::chrono_literals;
+using test::FieldTap;
 using test::FollowedRoom;
 using testing::HasSubstr;
 
@@ -59,6 +63,28 @@ TEST_F(FieldBegins, WhoIsSentAwayMayReturn) {
   const auto late = room_->open();
   EXPECT_TRUE(late->may_return());
   EXPECT_FALSE(late->begun());
+}
+
+// Whoever changes the room has its lock, and would wait for whoever reads it.
+TEST_F(FieldBegins, WhoAsksInVainDoesNotWaitForTheRoom) {
+  for (std::size_t i = 0; i < RoomRuntime::kMostFieldReaders; ++i)
+    room_->open(room_->join(MemberKind::watcher, "", Role::observer));
+  const auto reader = std::make_shared<FieldTap>(room_->viewer());
+  const auto ask = [&] {
+    std::future<Result<void>> answer;
+    room_->happen([&](Room& room) {
+      answer = std::async(std::launch::async, [&] { return room_->runtime().watch_field(reader); });
+      EXPECT_EQ(answer.wait_for(10s), std::future_status::ready);
+      return room.mark(room_->viewer(), "here");
+    });
+    return answer.get();
+  };
+  const Result<void> full = ask();
+  ASSERT_FALSE(full);
+  EXPECT_EQ(full.error().code, ErrorCode::exhausted);
+  room_->runtime().end_streams("the room was closed");
+  EXPECT_TRUE(ask());
+  EXPECT_EQ(reader->ended(), "the room was closed");
 }
 
 }  // namespace
