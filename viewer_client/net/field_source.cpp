@@ -27,6 +27,7 @@ class ServerField final : public FieldSource {
     Result<Case> bone = cached_case(options_.cache, room.case_hash, [&](const std::filesystem::path& folder) {
       return wire::fetch_case_files(room, folder, control);
     });
+    if (bone) fetched_ = room.case_hash;
     if (!bone && bone.error().code == ErrorCode::internal)
       bone.error().message += "; make space there, or set XDG_CACHE_HOME to another folder";
     return bone;
@@ -34,6 +35,9 @@ class ServerField final : public FieldSource {
 
   End read(const std::function<bool(const v1::WatchFieldResponse&)>& take) override {
     const wire::JoinedRoom room = options_.room();
+    // The leaves of another case do not belong to the bone that was fetched.
+    if (room.case_hash != fetched_)
+      return {{ErrorCode::unsupported, "the server now has another case: start the viewer anew to see it"}, true};
     v1::WatchFieldRequest request;
     request.set_author(room.author.value);
     request.set_kernel_version(kKernelVersion);
@@ -86,6 +90,7 @@ class ServerField final : public FieldSource {
 
   const FieldSourceOptions options_;
   OpenRequests calls_;
+  Digest fetched_;  // the case of imported()
   std::optional<Clock::time_point> refused_since_;
 };
 

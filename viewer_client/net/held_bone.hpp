@@ -24,7 +24,7 @@ class FieldSource {
   virtual ~FieldSource() = default;
   // The bone before any cut. Errors: unavailable (asking again may help); all others are final.
   [[nodiscard]] virtual Result<Case> imported() = 0;
-  // Opens a stream, and reads it until it ends or `take` returns false.
+  // Opens a stream of the imported bone, and reads it until it ends or `take` returns false.
   [[nodiscard]] virtual End read(const std::function<bool(const v1::WatchFieldResponse&)>& take) = 0;
   // For good; imported() and read() return soon. Any thread.
   virtual void cancel() = 0;

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <array>
+#include <atomic>
 #include <thread>
 
 #include "common/field/kernel.hpp"
@@ -125,6 +126,24 @@ TEST_F(ServedField, AsksAgainWhileTheRoomMayComeBackAndNeverAfterItsEnd) {
   runtime().end_streams("the room takes no more cuts");
   ASSERT_TRUE(held->wait([](const HeldBoneStatus& now) { return now.state == HeldBoneState::failed; }, kPatience));
   EXPECT_EQ(held->status().why->message, "the room takes no more cuts");
+}
+
+TEST_F(ServedField, LeavesOfAnotherCaseAreNeverAsked) {
+  const wire::JoinedRoom room = join(address(), wire::ClientKind::viewer);
+  std::atomic<bool> other{false};
+  const auto newest = [&] {
+    wire::JoinedRoom now = room;
+    if (other) now.case_hash = Digest{{7}};
+    return now;
+  };
+  const auto held = HeldBone::start(field_of_server({.room = newest, .cache = dir_ / "viewers"}),
+                                    {.pause = 5ms, .longest_pause = 20ms});
+  ASSERT_TRUE(held->wait([](const HeldBoneStatus& now) { return now.state == HeldBoneState::follows; }, kPatience));
+  other = true;
+  const auto newer = HeldBone::start(field_of_server({.room = [&] { return room; }, .cache = dir_ / "viewers"}));
+  ASSERT_TRUE(held->wait([](const HeldBoneStatus& now) { return now.state == HeldBoneState::failed; }, kPatience))
+      << "the newer stream has ended the older one, which has asked again";
+  EXPECT_THAT(held->status().why->message, HasSubstr("another case"));
 }
 
 TEST_F(ServedField, SoManyMayReadAtOnce) {
