@@ -27,7 +27,12 @@ class ServerField final : public FieldSource {
     Result<Case> bone = cached_case(options_.cache, room.case_hash, [&](const std::filesystem::path& folder) {
       return wire::fetch_case_files(room, folder, control);
     });
-    if (bone) fetched_ = room.case_hash;
+    if (bone) {
+      fetched_ = room.case_hash;
+      refused_since_.reset();
+    } else {
+      judge(bone.error());
+    }
     if (!bone && bone.error().code == ErrorCode::internal)
       bone.error().message += "; make space there, or set XDG_CACHE_HOME to another folder";
     return bone;
@@ -59,6 +64,12 @@ class ServerField final : public FieldSource {
   void cancel() override { calls_.cancel_all(); }
 
  private:
+  // As of a stream: a server that refuses the case may be a restarted one.
+  void judge(Error& why) {
+    const bool refused = why.code == ErrorCode::denied || why.code == ErrorCode::not_found;
+    if (refused && !stays_refused()) why.code = ErrorCode::unavailable;
+    if (!refused) refused_since_.reset();
+  }
   [[nodiscard]] End end_of(const grpc::Status& status) {
     const std::string said =
         status.error_message().empty() ? "the server closed the connection" : status.error_message();
