@@ -12,6 +12,7 @@
 #include "server/storage/room_store.hpp"
 #include "tests/support/disk/memory_disk.hpp"
 #include "tests/unit/viewer_client/followed_room.hpp"
+#include "viewer_client/net/field_follower.hpp"
 
 namespace osteon {
 namespace {
@@ -20,6 +21,8 @@ using namespace std::chrono_literals;
 using test::FieldTap;
 using test::FollowedRoom;
 using testing::HasSubstr;
+
+constexpr std::size_t kEnough = std::size_t{1} << 30;
 
 class FieldBegins : public testing::Test {
  protected:
@@ -63,6 +66,40 @@ TEST_F(FieldBegins, WhoIsSentAwayMayReturn) {
   const auto late = room_->open();
   EXPECT_TRUE(late->may_return());
   EXPECT_FALSE(late->begun());
+}
+
+// What a reader is sent must be durable, and whole: neither what the leaves contain already nor what came while they
+// were copied may be missing or counted twice.
+TEST_F(FieldBegins, EventsAreDurableBetweenTheCopyAndItsSending) {
+  room_->cut(3);
+  room_->queue_cut();
+  room_->tick(false);  // decided, in the leaves, and not durable
+  const RoomSeq contained = room_->runtime().room_seq();
+  room_->queue_cut();
+  room_->queue_cut();  // decided after the copy, and before its leaves are given
+  const auto tap = room_->open();
+  room_->queue_cut();  // after them
+  room_->tick(false);
+  ASSERT_TRUE(tap->begun());
+  EXPECT_FALSE(tap->given_leaves());
+  EXPECT_TRUE(tap->read().empty()) << "it is not durable";
+  room_->tick();
+  EXPECT_TRUE(tap->given_leaves());
+  room_->cut(2);
+  FieldFollower viewer(bone_, kEnough);
+  viewer.begin();
+  int events = 0;
+  for (const v1::WatchFieldResponse& message : tap->read()) {
+    const Result<void> taken = viewer.take(message);
+    ASSERT_TRUE(taken) << taken.error().message;
+    events += message.has_committed() ? 1 : 0;
+  }
+  EXPECT_EQ(events, 5) << "three around the copy and two after it";
+  const BoneStatus room = room_->status();
+  EXPECT_EQ(room.room_seq.value, contained.value + 5);
+  ASSERT_TRUE(viewer.follows());
+  EXPECT_EQ(viewer.bone().room_seq(), room.room_seq);
+  EXPECT_EQ(viewer.bone().hash(), room.field_hash);
 }
 
 // Whoever changes the room has its lock, and would wait for whoever reads it.
