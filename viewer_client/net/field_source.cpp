@@ -90,6 +90,7 @@ class ServerField final : public FieldSource {
       case grpc::StatusCode::NOT_FOUND:
         return {{ErrorCode::unavailable, said}, stays_refused()};
       default:
+        refused_since_.reset();  // a server that is away or busy refuses nobody
         return {{ErrorCode::unavailable, said}};
     }
   }

@@ -4,7 +4,12 @@
 
 #include <array>
 #include <atomic>
+#include <functional>
+#include <memory>
+#include <string>
 #include <thread>
+#include <utility>
+#include <vector>
 
 #include "common/field/kernel.hpp"
 #include "osteon/v1/field.grpc.pb.h"
@@ -196,6 +201,45 @@ TEST_F(ServedField, RefusesStrangersAndOtherKernels) {
                       {.pause = 5ms, .longest_pause = 20ms});
   ASSERT_TRUE(held->wait([](const HeldBoneStatus& now) { return now.state == HeldBoneState::failed; }, kPatience));
   EXPECT_THAT(held->status().why->message, HasSubstr("call Join first"));
+}
+
+// Answers each call by its number, from 1 on.
+class NumberedAnswers final : public v1::FieldService::Service {
+ public:
+  explicit NumberedAnswers(std::function<grpc::Status(int)> answer) : answer_(std::move(answer)) {}
+  grpc::Status WatchField(grpc::ServerContext*, const v1::WatchFieldRequest*,
+                          grpc::ServerWriter<v1::WatchFieldResponse>*) override {
+    return answer_(++calls);
+  }
+  std::atomic<int> calls{0};
+
+ private:
+  std::function<grpc::Status(int)> answer_;
+};
+
+TEST(FieldSource, APauseOfTheServerIsNoRefusal) {
+  constexpr auto kRefused = 100ms;
+  NumberedAnswers service([&](int call) {
+    if (call == 2) std::this_thread::sleep_for(2 * kRefused);
+    const bool refuses = call == 1 || call == 3;
+    return grpc::Status(refuses ? grpc::StatusCode::NOT_FOUND : grpc::StatusCode::UNAVAILABLE, "not now");
+  });
+  int port = 0;
+  grpc::ServerBuilder builder;
+  builder.AddListeningPort("127.0.0.1:0", grpc::InsecureServerCredentials(), &port);
+  builder.RegisterService(&service);
+  const std::unique_ptr<grpc::Server> server = builder.BuildAndStart();
+  const TempDir cache;
+  const Case bone = test_block();
+  ASSERT_TRUE(bone.save(cache / to_hex(bone.hash())));
+  wire::JoinedRoom room;
+  room.channel = grpc::CreateChannel("127.0.0.1:" + std::to_string(port), grpc::InsecureChannelCredentials());
+  room.case_hash = bone.hash();
+  const auto held =
+      HeldBone::start(field_of_server({.room = [&] { return room; }, .cache = cache / "", .patience = kRefused}),
+                      {.pause = 1ms, .longest_pause = 2ms});
+  EXPECT_TRUE(wait_until([&] { return service.calls >= 5; }, kPatience)) << "it was refused twice, each for a moment";
+  EXPECT_NE(held->status().state, HeldBoneState::failed);
 }
 
 }  // namespace
