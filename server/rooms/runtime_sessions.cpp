@@ -188,14 +188,17 @@ bool RoomRuntime::Impl::ends(FieldSubscriber& reader) const {
   return ended.has_value();
 }
 
-Result<FieldSubscriber*> RoomRuntime::Impl::place_for(const FieldSubscriber& reader) const {
+Result<FieldSubscriber*> RoomRuntime::Impl::place_for(const FieldSubscriber& reader, std::size_t leaf_bytes) const {
   FieldSubscriber* before = nullptr;
+  std::size_t waiting = 0;
   field_readers.each([&](FieldSubscriber& one) {
-    if (one.author() == reader.author()) before = &one;
+    one.author() == reader.author() ? void(before = &one) : void(waiting += one.leaf_bytes());
   });
   if (!before && field_readers.size() >= kMostFieldReaders)
     return failure(ErrorCode::exhausted, std::to_string(kMostFieldReaders) +
                                              " viewers show the inside of this bone already; close one of them");
+  if (waiting > 0 && waiting + leaf_bytes > rates_.most_leaf_bytes)
+    return failure(ErrorCode::exhausted, "the inside of the bone is being sent to others; ask again");
   return before;
 }
 
@@ -360,9 +363,10 @@ Result<void> RoomRuntime::watch_field(const std::shared_ptr<FieldSubscriber>& re
     const ReaderLock room_lock(impl_->room_mutex);
     leaves = impl_->places_of_leaves();
     SessionStart start = impl_->start_of_field();
+    start.leaf_bytes = leaves.size() * std::size_t{kLeafVoxels} * sizeof(FieldLeaf{}.values[0]);
     const MutexLock lock(impl_->sessions_mutex);
     if (impl_->ends(*reader)) return {};
-    const Result<FieldSubscriber*> before = impl_->place_for(*reader);
+    const Result<FieldSubscriber*> before = impl_->place_for(*reader, start.leaf_bytes);
     if (!before) return tl::unexpected(before.error());
     if (*before) {
       (*before)->replaced("another connection of the same viewer has replaced it");

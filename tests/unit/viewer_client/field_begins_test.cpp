@@ -124,5 +124,23 @@ TEST_F(FieldBegins, WhoAsksInVainDoesNotWaitForTheRoom) {
   EXPECT_EQ(reader->ended(), "the room was closed");
 }
 
+// Copies for slow readers do not add up, and a single reader always gets its bone.
+TEST(FieldCopies, AreNotMadeForOneReaderAfterAnotherWithoutEnd) {
+  const Case bone = test::test_block();
+  FollowedRoom room(Room(bone), nullptr, 1);
+  room.cut(3);
+  const auto slow = room.open();
+  EXPECT_GT(slow->leaf_bytes(), 0u);
+  const auto other = std::make_shared<FieldTap>(room.hand());
+  const Result<void> refused = room.runtime().watch_field(other);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, ErrorCode::exhausted);
+  EXPECT_FALSE(other->begun());
+  EXPECT_FALSE(slow->read().empty());
+  EXPECT_EQ(slow->leaf_bytes(), 0u);
+  EXPECT_TRUE(room.runtime().watch_field(other)) << "the other's leaves are on their way";
+  room.runtime().leave(*other);
+}
+
 }  // namespace
 }  // namespace osteon

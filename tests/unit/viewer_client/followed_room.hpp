@@ -30,7 +30,7 @@ class FieldTap final : public FieldSubscriber {
     begun_ = true;
     MessageParts before;
     for (const SessionMessage& message : start.before) before.push_back(message.bytes);
-    queue_.begin(start.contained, std::move(before), std::move(start.complete));
+    queue_.begin(start.contained, std::move(before), std::move(start.complete), start.leaf_bytes);
   }
   void set_leaves(std::vector<FieldLeaf> leaves) override {
     const std::lock_guard lock(mutex_);
@@ -53,6 +53,10 @@ class FieldTap final : public FieldSubscriber {
   std::size_t waiting() const override {
     const std::lock_guard lock(mutex_);
     return queue_.waiting();
+  }
+  std::size_t leaf_bytes() const override {
+    const std::lock_guard lock(mutex_);
+    return queue_.leaf_bytes();
   }
 
   // What was sent since the last call.
@@ -95,7 +99,8 @@ class FieldTap final : public FieldSubscriber {
 class FollowedRoom {
  public:
   explicit FollowedRoom(const Case& bone) : FollowedRoom(Room(bone), nullptr) {}
-  FollowedRoom(Room room, RoomStore* store) : runtime_(std::move(room), driven(), nullptr, Detail::automatic, store) {
+  FollowedRoom(Room room, RoomStore* store, std::size_t most_leaf_bytes = RuntimeRates{}.most_leaf_bytes)
+      : runtime_(std::move(room), driven(most_leaf_bytes), nullptr, Detail::automatic, store) {
     hand_ = join(MemberKind::surgeon, "Ben", Role::trainee);
     viewer_ = join(MemberKind::watcher, "Ada", Role::instructor);
     sender_ = std::make_shared<FakeSession>(hand_);
@@ -139,8 +144,9 @@ class FollowedRoom {
   void tick(bool keep = true) { runtime_.tick(now_ += std::chrono::milliseconds(8), keep); }
 
  private:
-  static RuntimeRates driven() {
+  static RuntimeRates driven(std::size_t most_leaf_bytes) {
     RuntimeRates rates;
+    rates.most_leaf_bytes = most_leaf_bytes;
     rates.tick = rates.pieces = std::chrono::nanoseconds(0);
     rates.mesh = std::chrono::seconds(1);
     return rates;
