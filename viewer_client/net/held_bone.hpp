@@ -63,13 +63,14 @@ class HeldBone {
   // Also waits for the thread, which then uses the source no more. Whoever shares the bone may go on to read it.
   void end_and_join();
 
+  // Returns at once. The bone may already be one event newer.
   [[nodiscard]] HeldBoneStatus status() const;
-  // Calls `use` with the bone at one event. Cuts wait meanwhile, and so does end(). `use` may take no lock but leaves.
-  // False: there is no bone.
+  // Calls `use` with the bone at one event. Waits while an event changes the bone, which takes long for the first
+  // leaves and for an undo; cuts wait for `use`. `use` may take no lock but leaves. False: there is no bone.
   bool read(const std::function<void(const Replica& bone)>& use) const;
-  // Where it has changed since the last call; everywhere at first.
+  // Where it has changed since the last call; everywhere at first. Waits as read() does.
   [[nodiscard]] FieldChanges take_changes();
-  // Waits until `done`. False: it was not within `patience`.
+  // Waits until `done`, which may take no lock. False: it was not within `patience`.
   bool wait(const std::function<bool(const HeldBoneStatus&)>& done, std::chrono::milliseconds patience) const;
 
  private:

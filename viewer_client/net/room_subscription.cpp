@@ -508,7 +508,7 @@ Result<std::unique_ptr<RoomSubscription>> RoomSubscription::start(const RoomSubs
 
 void RoomSubscription::end() {
   impl_->requests.cancel_all();
-  // Its lock comes before this one.
+  // Its lock has the rank of this one.
   if (const std::shared_ptr<HeldBone> held = held_bone()) held->end();
   const MutexLock lock(impl_->mutex);
   impl_->ending = true;
