@@ -97,7 +97,8 @@ FieldSource::End HeldBone::Impl::follow(Backoff& backoff) {
 
 Result<void> HeldBone::Impl::take(const v1::WatchFieldResponse& message) {
   if (ending) return failure(ErrorCode::unavailable, "it ends");
-  HeldBoneStatus now{.state = HeldBoneState::follows};
+  HeldBoneStatus now;
+  now.state = HeldBoneState::follows;
   bool follows = false;
   const Result<void> taken = [&] {
     const MutexLock lock(mutex);
