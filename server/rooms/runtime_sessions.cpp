@@ -192,7 +192,10 @@ Result<FieldSubscriber*> RoomRuntime::Impl::place_for(const FieldSubscriber& rea
   FieldSubscriber* before = nullptr;
   std::size_t waiting = 0;
   field_readers.each([&](FieldSubscriber& one) {
-    one.author() == reader.author() ? void(before = &one) : void(waiting += one.leaf_bytes());
+    if (one.author() == reader.author())
+      before = &one;
+    else
+      waiting += one.leaf_bytes();
   });
   if (!before && field_readers.size() >= kMostFieldReaders)
     return failure(ErrorCode::exhausted, std::to_string(kMostFieldReaders) +
