@@ -1,5 +1,6 @@
 // Fetches the files of a room's case from its server.
 #pragma once
+#include <chrono>
 #include <filesystem>
 #include <functional>
 
@@ -18,10 +19,13 @@ struct FetchControl {
   std::function<bool(grpc::ClientContext& call)> begin{};  // before the call, which may be cancelled until `end`;
                                                            // false: it does not begin
   std::function<void(grpc::ClientContext& call)> end{};
+  // Between two parts. A case over a slow line takes as long as it takes.
+  std::chrono::milliseconds longest_silence{20'000};
 };
 
-// Writes the case's files to the folder as they are received. Errors: cancelled, unavailable (the server stopped),
-// unsupported (it sent a file that no case has), internal (the folder cannot be written).
+// Writes the case's files to the folder as they are received. Errors: cancelled, unavailable (the server stopped or
+// became silent), denied, not_found (the server has no such case), unsupported (it is older, or sent a file that no
+// case has), internal (the folder cannot be written).
 [[nodiscard]] Result<void> fetch_case_files(const JoinedRoom& room, const std::filesystem::path& folder,
                                             const FetchControl& control);
 

@@ -7,6 +7,11 @@
 #include "common/wire/convert.hpp"
 
 namespace osteon {
+namespace {
+
+std::size_t bytes_of(const FieldLeaf& leaf) { return leaf.values.size() * sizeof(leaf.values[0]); }
+
+}  // namespace
 
 Bytes serialised(const google::protobuf::MessageLite& message) {
   return std::make_shared<const std::string>(message.SerializeAsString());
@@ -60,7 +65,8 @@ MessageParts MeshSendQueue::take() {
   return parts;
 }
 
-void SessionSendQueue::begin(RoomSeq contained, MessageParts before, Bytes complete) {
+void SessionSendQueue::begin(RoomSeq contained, MessageParts before, Bytes complete, std::size_t leaf_bytes) {
+  leaf_bytes_ = leaf_bytes;
   contained_ = contained;
   before_.assign(std::make_move_iterator(before.begin()), std::make_move_iterator(before.end()));
   complete_ = std::move(complete);
@@ -69,25 +75,40 @@ void SessionSendQueue::begin(RoomSeq contained, MessageParts before, Bytes compl
 void SessionSendQueue::set_leaves(std::vector<FieldLeaf> leaves) {
   leaves_ = std::move(leaves);
   leaves_known_ = true;
+  leaf_bytes_ = 0;
+  for (const FieldLeaf& leaf : leaves_) leaf_bytes_ += bytes_of(leaf);
 }
 
 bool SessionSendQueue::add(RoomSeq seq, Bytes entry) {
   if (!takes(seq)) return true;
-  if (entries_.size() >= kMaxEntries) return false;
-  entries_.push_back({++index_, std::move(entry)});
+  if (!has_space(entry)) return false;
+  put(++index_, std::move(entry));
   seqs_.emplace_back(index_, seq);
   if (seqs_.size() > kMaxEntries) seqs_.pop_front();
   return true;
 }
 
 bool SessionSendQueue::add_answer(Bytes entry) {
-  if (entries_.size() >= kMaxEntries) return false;
-  entries_.push_back({0, std::move(entry)});
+  if (!has_space(entry)) return false;
+  put(0, std::move(entry));
   return true;
 }
 
+bool SessionSendQueue::has_space(const Bytes& entry) const {
+  return entries_.size() < kMaxEntries && entry->size() <= most_entry_bytes_ - entry_bytes_;
+}
+
+void SessionSendQueue::put(std::uint64_t index, Bytes entry) {
+  entry_bytes_ += entry->size();
+  entries_.push_back({index, std::move(entry)});
+}
+
 RoomSeq SessionSendQueue::arrived(std::uint64_t index) {
-  std::erase_if(entries_, [&](const Entry& entry) { return entry.index != 0 && entry.index <= index; });
+  std::erase_if(entries_, [&](const Entry& entry) {
+    const bool has = entry.index != 0 && entry.index <= index;
+    if (has) entry_bytes_ -= entry.bytes->size();
+    return has;
+  });
   RoomSeq newest;
   for (; !seqs_.empty() && seqs_.front().first <= index; seqs_.pop_front()) newest = seqs_.front().second;
   return newest;
@@ -105,6 +126,7 @@ MessageParts SessionSendQueue::take() {
   if (next_leaf_ < leaves_.size()) {
     *response.mutable_leaf() = wire::to_wire(leaves_[next_leaf_]);
     // Each leaf's memory is freed when it is sent; the list itself with the last leaf.
+    leaf_bytes_ -= bytes_of(leaves_[next_leaf_]);
     leaves_[next_leaf_].values = {};
     if (++next_leaf_ == leaves_.size()) {
       leaves_ = {};
@@ -116,6 +138,7 @@ MessageParts SessionSendQueue::take() {
   if (entries_.empty()) return {};
   const Entry entry = std::move(entries_.front());
   entries_.pop_front();
+  entry_bytes_ -= entry.bytes->size();
   if (entry.index == 0) return {entry.bytes};
   // All streams share the entry. Its index is appended, as protobuf merges messages.
   v1::SessionResponse number;

@@ -67,14 +67,18 @@ class SessionSendQueue {
  public:
   static constexpr std::size_t kMaxEntries = 8192;
 
-  // `before`: sent before the leaves, once the leaves are given. `complete`: sent after them.
-  void begin(RoomSeq contained, MessageParts before, Bytes complete);
+  SessionSendQueue() = default;
+  explicit SessionSendQueue(std::size_t most_entry_bytes) : most_entry_bytes_(most_entry_bytes) {}
+
+  // `before`: sent before the leaves, once the leaves are given. `complete`: sent after them. `leaf_bytes`: expected.
+  void begin(RoomSeq contained, MessageParts before, Bytes complete, std::size_t leaf_bytes = 0);
   // The leaves may be copied after entries have come: every leaf contains at least the events up to `contained`. What a
   // leaf contains beyond that changes nothing when its entry is applied again. A cut field is a minimum over its cuts,
   // and all other entries set leaves to their values at that entry.
   void set_leaves(std::vector<FieldLeaf> leaves);
   // Adds an entry of the room. Skips an entry up to `contained`. Returns false, and does not add the entry, if
-  // kMaxEntries wait already. Added entries are counted from 1 on and carry this index.
+  // kMaxEntries wait already, or if more than `most_entry_bytes` would wait. Added entries are counted from 1 on and
+  // carry this index.
   [[nodiscard]] bool add(RoomSeq seq, Bytes entry);
   [[nodiscard]] bool takes(RoomSeq seq) const { return seq > contained_; }
   // Index of the newest entry that was added.
@@ -88,8 +92,13 @@ class SessionSendQueue {
   [[nodiscard]] bool add_answer(Bytes entry);
   [[nodiscard]] MessageParts take();
   [[nodiscard]] std::size_t waiting() const { return entries_.size(); }
+  [[nodiscard]] std::size_t leaf_bytes() const { return leaf_bytes_; }  // that wait, or are expected
 
  private:
+  [[nodiscard]] bool has_space(const Bytes& entry) const;
+  void put(std::uint64_t index, Bytes entry);
+
+  std::size_t most_entry_bytes_ = SIZE_MAX, entry_bytes_ = 0, leaf_bytes_ = 0;
   std::vector<FieldLeaf> leaves_;
   std::size_t next_leaf_ = 0;
   RoomSeq contained_;

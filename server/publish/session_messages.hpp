@@ -41,6 +41,7 @@ struct SessionStart {
   std::uint64_t lease_epoch = 0;         // of the session's author
   std::vector<BodyId> bodies;
   std::vector<SessionMessage> before;  // sent before the leaves
+  std::size_t leaf_bytes = 0;          // of the leaves that follow, at most
   Bytes complete;                      // the message that ends the leaves; a whole SessionResponse
 };
 

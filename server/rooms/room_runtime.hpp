@@ -65,6 +65,9 @@ class FieldSubscriber : public Subscriber {
   virtual void begin(SessionStart start) = 0;
   virtual void set_leaves(std::vector<FieldLeaf> leaves) = 0;
   virtual void enqueue(const SessionMessage& message) = 0;
+  // Another stream of its author was opened, or the process stops: the author may come again.
+  virtual void replaced(const std::string& why) { end(why); }
+  [[nodiscard]] virtual std::size_t leaf_bytes() const = 0;  // of its leaves that are not sent yet
 };
 
 struct RuntimeRates {
@@ -79,6 +82,8 @@ struct RuntimeRates {
   // The bone stands on a compliant mount, about its middle, and everybody with a session can push it; not in a
   // playback.
   bool mount = false;
+  // [A] Of leaves that are copied for readers of the field and not sent yet. One reader is always served.
+  std::size_t most_leaf_bytes = std::size_t{1} << 30;
 };
 
 struct RuntimeHealth {
@@ -169,8 +174,9 @@ class RoomRuntime {
                                           const Digest& secret = {});
   // Of a room. Each is sent a copy of all leaves at first.
   static constexpr std::size_t kMostFieldReaders = 32;
-  // The reader gets every event after those in its leaves. It replaces an earlier reader of its author. Errors:
-  // unavailable (a playback), exhausted (kMostFieldReaders read already).
+  // The reader gets every event after those in its leaves. It replaces an earlier reader of its author. If the streams
+  // have ended, it is ended too, and nothing is copied. Errors: unavailable (a playback), exhausted (kMostFieldReaders
+  // read already, or the leaves of others still wait).
   [[nodiscard]] Result<void> watch_field(const std::shared_ptr<FieldSubscriber>& reader);
   // `look`: the author's first view. Without one, the subscriber is sent the whole bone in full.
   void watch_mesh(MeshSubscriber& subscriber, const std::optional<ViewFrustum>& look = std::nullopt);

@@ -98,6 +98,11 @@ struct RoomRuntime::Impl {
   void close_room(const Error& why);
   [[nodiscard]] std::optional<Error> closed() const;
   void end_sessions(const std::string& why, bool to_return = false);
+  // As the open streams were. False: they go on.
+  bool ends(FieldSubscriber& reader) const OSTEON_REQUIRES(sessions_mutex);
+  // The reader of its author that it replaces, or null. Error exhausted: there is no place for it.
+  Result<FieldSubscriber*> place_for(const FieldSubscriber& reader, std::size_t leaf_bytes = 0) const
+      OSTEON_REQUIRES(sessions_mutex);
   void show_scene();
   void read_leaves(std::vector<FieldLeaf>& leaves);
 

@@ -180,7 +180,29 @@ void RoomRuntime::Impl::end_sessions(const std::string& why, bool to_return) {
   ended = why;
   may_return = to_return;
   sessions.each([&](SessionSubscriber& subscriber) { to_return ? subscriber.replaced(why) : subscriber.end(why); });
-  field_readers.each([&](FieldSubscriber& reader) { reader.end(why); });
+  field_readers.each([&](FieldSubscriber& reader) { ends(reader); });
+}
+
+bool RoomRuntime::Impl::ends(FieldSubscriber& reader) const {
+  if (ended) may_return ? reader.replaced(*ended) : reader.end(*ended);
+  return ended.has_value();
+}
+
+Result<FieldSubscriber*> RoomRuntime::Impl::place_for(const FieldSubscriber& reader, std::size_t leaf_bytes) const {
+  FieldSubscriber* before = nullptr;
+  std::size_t waiting = 0;
+  field_readers.each([&](FieldSubscriber& one) {
+    if (one.author() == reader.author())
+      before = &one;
+    else
+      waiting += one.leaf_bytes();
+  });
+  if (!before && field_readers.size() >= kMostFieldReaders)
+    return failure(ErrorCode::exhausted, std::to_string(kMostFieldReaders) +
+                                             " viewers show the inside of this bone already; close one of them");
+  if (waiting > 0 && waiting + leaf_bytes > rates_.most_leaf_bytes)
+    return failure(ErrorCode::exhausted, "the inside of the bone is being sent to others; ask again");
+  return before;
 }
 
 Result<void> RoomRuntime::check_witness(const Witness& kept) {
@@ -332,29 +354,31 @@ Result<void> RoomRuntime::watch_field(const std::shared_ptr<FieldSubscriber>& re
   if (impl_->player)
     return failure(ErrorCode::unavailable,
                    "this room shows what happened in another: it sends its surface and not the inside of its bone");
+  {
+    // Whoever asks in vain costs no work under the room's lock.
+    const MutexLock lock(impl_->sessions_mutex);
+    if (impl_->ends(*reader)) return {};
+    if (const Result<FieldSubscriber*> place = impl_->place_for(*reader); !place) return tl::unexpected(place.error());
+  }
   std::vector<FieldLeaf> leaves;
   {
     // Held until the reader is in the list, as for sessions.
     const ReaderLock room_lock(impl_->room_mutex);
     leaves = impl_->places_of_leaves();
     SessionStart start = impl_->start_of_field();
+    start.leaf_bytes = leaves.size() * std::size_t{kLeafVoxels} * sizeof(FieldLeaf{}.values[0]);
     const MutexLock lock(impl_->sessions_mutex);
-    FieldSubscriber* before = nullptr;
-    impl_->field_readers.each([&](FieldSubscriber& one) {
-      if (one.author() == reader->author()) before = &one;
-    });
-    if (!before && impl_->field_readers.size() >= kMostFieldReaders)
-      return failure(ErrorCode::exhausted, std::to_string(kMostFieldReaders) +
-                                               " viewers show the inside of this bone already; close one of them");
-    if (before) {
-      before->end("another connection of the same viewer has replaced it");
-      impl_->field_readers.remove(*before);
+    if (impl_->ends(*reader)) return {};
+    const Result<FieldSubscriber*> before = impl_->place_for(*reader, start.leaf_bytes);
+    if (!before) return tl::unexpected(before.error());
+    if (*before) {
+      (*before)->replaced("another connection of the same viewer has replaced it");
+      impl_->field_readers.remove(**before);
     } else {
       impl_->people.came(reader->author());
     }
     impl_->field_readers.add(*reader);
     reader->begin(std::move(start));
-    if (impl_->ended) reader->end(*impl_->ended);
   }
   impl_->give_leaves(*this, reader, std::move(leaves));
   return {};

@@ -18,8 +18,11 @@ namespace {
 
 constexpr const char* kWatchField = "/osteon.v1.FieldService/WatchField";
 
-// Sends what a session is sent of the field, in the same bytes. At most SessionSendQueue::kMaxEntries events wait for a
-// slow reader, which then has to ask again.
+// [A] Of events that wait for one reader. All readers share most of them.
+constexpr std::size_t kMostEntryMiB = 256;
+
+// Sends what a session is sent of the field, in the same bytes. At most SessionSendQueue::kMaxEntries events, of at
+// most kMostEntryMiB, wait for a slow reader, which then has to ask again.
 class FieldStream final : public OutStream<WriteReactor>, public FieldSubscriber {
  public:
   FieldStream(std::shared_ptr<OpenRoom> room, AuthorId author) : room_(std::move(room)), author_(author) {}
@@ -42,7 +45,7 @@ class FieldStream final : public OutStream<WriteReactor>, public FieldSubscriber
     for (const SessionMessage& message : start.before) before.push_back(message.bytes);
     const MutexLock lock(mutex_);
     if (failing()) return;
-    send_queue_.begin(start.contained, std::move(before), std::move(start.complete));
+    send_queue_.begin(start.contained, std::move(before), std::move(start.complete), start.leaf_bytes);
     pump();
   }
   void set_leaves(std::vector<FieldLeaf> leaves) override {
@@ -57,14 +60,19 @@ class FieldStream final : public OutStream<WriteReactor>, public FieldSubscriber
     const MutexLock lock(mutex_);
     if (closing()) return;
     if (send_queue_.add(message.seq, entry)) return pump();
-    close_locked({StatusCode::RESOURCE_EXHAUSTED, "the reader is more than " +
-                                                      std::to_string(SessionSendQueue::kMaxEntries) +
-                                                      " events behind the room; ask again"});
+    close_locked({StatusCode::RESOURCE_EXHAUSTED,
+                  "the reader is more than " + std::to_string(SessionSendQueue::kMaxEntries) + " events or " +
+                      std::to_string(kMostEntryMiB) + " MiB behind the room; ask again"});
   }
-  void end(const std::string& why) override { close({StatusCode::UNAVAILABLE, why}); }
+  void end(const std::string& why) override { close({StatusCode::ABORTED, why}); }
+  void replaced(const std::string& why) override { close({StatusCode::UNAVAILABLE, why}); }
   std::size_t waiting() const override {
     const MutexLock lock(mutex_);
     return send_queue_.waiting();
+  }
+  std::size_t leaf_bytes() const override {
+    const MutexLock lock(mutex_);
+    return send_queue_.leaf_bytes();
   }
 
  private:
@@ -82,7 +90,7 @@ class FieldStream final : public OutStream<WriteReactor>, public FieldSubscriber
 
   const std::shared_ptr<OpenRoom> room_;  // shared with the rooms and the other streams
   const AuthorId author_;
-  SessionSendQueue send_queue_ OSTEON_GUARDED_BY(mutex_);
+  SessionSendQueue send_queue_ OSTEON_GUARDED_BY(mutex_){kMostEntryMiB * 1024 * 1024};
 };
 
 // OK if the caller computes cuts as this server does.

@@ -11,8 +11,10 @@ namespace osteon {
 namespace {
 
 constexpr int kCutsBetweenWeighings = 64;
-// [A] No leaf with bone begins farther from the bone's box: the largest, 8 samples of the pitch, is a few mm long.
-constexpr double kFarthest_mm = 100.0;
+// Of a cut's tip and of leaves from the bone's box: as far as a server can be set to allow.
+constexpr double kFarthest_mm = 1000.0;
+// [A] Way of a tip in one cut; servers usually allow 25 mm. What is swept is computed, so it must have a bound.
+constexpr double kLongestWay_mm = 200.0;
 
 Error at_fault(const std::string& what) {
   return {ErrorCode::invalid_input, "the server sent an invalid message: " + what};
@@ -121,6 +123,15 @@ Result<void> FieldFollower::take(const v1::CommittedCut& committed) {
   if (!cut) return tl::unexpected(cut.error());
   const ToolBox::Entry* tool = tools_->find(cut->tool);
   if (!tool || !tool->body.cuts()) return tl::unexpected(at_fault("committed.cut names a tool that was not sent"));
+  double way_mm = 0.0;
+  Vec3 before_mm = dequantise(cut->path.front()).position_mm;
+  for (const QuantisedPose& pose : cut->path) {
+    const Vec3 tip_mm = dequantise(pose).position_mm;
+    way_mm += (tip_mm - before_mm).norm();
+    before_mm = tip_mm;
+    if (!is_near(tip_mm)) return tl::unexpected(at_fault("committed.cut is far from the bone"));
+  }
+  if (way_mm > kLongestWay_mm) return tl::unexpected(at_fault("committed.cut is longer than any"));
   if (RoomSeq{committed.room_seq()} <= bone_.room_seq())
     return tl::unexpected(at_fault("committed.room_seq is not newer than the event before"));
   bone_.commit(RoomSeq{committed.room_seq()}, *cut, false);
@@ -157,11 +168,14 @@ Result<void> FieldFollower::take(const v1::ToolAdded& added) {
   return check_bytes();
 }
 
+bool FieldFollower::is_near(const Vec3& at_mm) const {
+  return (at_mm.array() >= near_.min_mm.array()).all() && (at_mm.array() <= near_.max_mm.array()).all();
+}
+
 Result<void> FieldFollower::keep_waiting(const v1::FieldLeaf& sent) {
   Result<FieldLeaf> leaf = checked(wire::from_wire(sent));
   if (!leaf) return tl::unexpected(leaf.error());
-  const Vec3 at_mm = position_mm(leaf->origin, level_pitch_mm(pitch_mm_, leaf->level));
-  if ((at_mm.array() < near_.min_mm.array()).any() || (at_mm.array() > near_.max_mm.array()).any())
+  if (!is_near(position_mm(leaf->origin, level_pitch_mm(pitch_mm_, leaf->level))))
     return tl::unexpected(at_fault("leaf.origin is far from the bone"));
   waiting_bytes_ += sizeof(FieldLeaf) + leaf->values.size() * sizeof(leaf->values[0]);
   waiting_.push_back(std::move(*leaf));

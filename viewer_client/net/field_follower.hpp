@@ -58,12 +58,13 @@ class FieldFollower {
   [[nodiscard]] Result<void> take(const v1::BoneChange& change);
   [[nodiscard]] Result<void> take(const v1::ToolAdded& added);
   [[nodiscard]] Result<void> keep_waiting(const v1::FieldLeaf& sent);
+  [[nodiscard]] bool is_near(const Vec3& at_mm) const;
   [[nodiscard]] Result<void> weigh();  // the fields
   [[nodiscard]] Result<void> check_bytes() const;
   void note_changes();
 
   const double pitch_mm_;
-  const Box near_;  // where leaves may begin
+  const Box near_;  // where leaves may begin and tips may be
   const std::size_t most_bytes_;
   const std::shared_ptr<ToolBox> tools_ = builtin_tool_box();  // shared with the replica's fields
   Replica bone_;

@@ -27,6 +27,12 @@ class ServerField final : public FieldSource {
     Result<Case> bone = cached_case(options_.cache, room.case_hash, [&](const std::filesystem::path& folder) {
       return wire::fetch_case_files(room, folder, control);
     });
+    if (bone) {
+      fetched_ = room.case_hash;
+      refused_since_.reset();
+    } else {
+      judge(bone.error());
+    }
     if (!bone && bone.error().code == ErrorCode::internal)
       bone.error().message += "; make space there, or set XDG_CACHE_HOME to another folder";
     return bone;
@@ -34,6 +40,9 @@ class ServerField final : public FieldSource {
 
   End read(const std::function<bool(const v1::WatchFieldResponse&)>& take) override {
     const wire::JoinedRoom room = options_.room();
+    // The leaves of another case do not belong to the bone that was fetched.
+    if (room.case_hash != fetched_)
+      return {{ErrorCode::unsupported, "the server now has another case: start the viewer anew to see it"}, true};
     v1::WatchFieldRequest request;
     request.set_author(room.author.value);
     request.set_kernel_version(kKernelVersion);
@@ -55,6 +64,12 @@ class ServerField final : public FieldSource {
   void cancel() override { calls_.cancel_all(); }
 
  private:
+  // As of a stream: a server that refuses the case may be a restarted one.
+  void judge(Error& why) {
+    const bool refused = why.code == ErrorCode::denied || why.code == ErrorCode::not_found;
+    if (refused && !stays_refused()) why.code = ErrorCode::unavailable;
+    if (!refused) refused_since_.reset();
+  }
   [[nodiscard]] End end_of(const grpc::Status& status) {
     const std::string said =
         status.error_message().empty() ? "the server closed the connection" : status.error_message();
@@ -66,14 +81,16 @@ class ServerField final : public FieldSource {
                 true};
       case grpc::StatusCode::FAILED_PRECONDITION:
         return {{ErrorCode::unsupported, said}, true};
+      case grpc::StatusCode::ABORTED:  // the room cannot go on
+        return {{ErrorCode::unavailable, said}, true};
       case grpc::StatusCode::PERMISSION_DENIED:
       case grpc::StatusCode::UNAUTHENTICATED:
         return {{ErrorCode::denied, said}, stays_refused()};
       case grpc::StatusCode::INVALID_ARGUMENT:
       case grpc::StatusCode::NOT_FOUND:
-      case grpc::StatusCode::ABORTED:
         return {{ErrorCode::unavailable, said}, stays_refused()};
       default:
+        refused_since_.reset();  // a server that is away or busy refuses nobody
         return {{ErrorCode::unavailable, said}};
     }
   }
@@ -85,6 +102,7 @@ class ServerField final : public FieldSource {
 
   const FieldSourceOptions options_;
   OpenRequests calls_;
+  Digest fetched_;  // the case of imported()
   std::optional<Clock::time_point> refused_since_;
 };
 

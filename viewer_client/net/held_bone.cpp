@@ -1,5 +1,7 @@
 #include "viewer_client/net/held_bone.hpp"
 
+#include <atomic>
+#include <mutex>
 #include <thread>
 #include <utility>
 
@@ -15,13 +17,16 @@ struct HeldBone::Impl {
   const std::unique_ptr<FieldSource> source;
   const HeldBoneOptions options;
 
+  std::atomic<bool> ending{false};
+  // Held while the bone changes, which takes long for the first leaves and after an undo. So `status` has its own.
   mutable Mutex mutex{LockRank::received};
-  mutable CondVar changed;
-  bool ending OSTEON_GUARDED_BY(mutex) = false;
   std::optional<FieldFollower> follower OSTEON_GUARDED_BY(mutex);
-  HeldBoneStatus status OSTEON_GUARDED_BY(mutex);
+  mutable Mutex status_mutex{LockRank::leaf};
+  mutable CondVar changed;
+  HeldBoneStatus status OSTEON_GUARDED_BY(status_mutex);
 
   std::thread thread;
+  std::once_flag thread_joined;
 
   void run();
   // True: the bone was fetched.
@@ -30,6 +35,10 @@ struct HeldBone::Impl {
   [[nodiscard]] Result<void> take(const v1::WatchFieldResponse& message);
   // Returns false when it ends.
   bool pause(Backoff& backoff);
+  [[nodiscard]] bool has_bone() const {
+    const MutexLock lock(mutex);
+    return follower && follower->whole();
+  }
   void interrupt(const Error& why);
   void fail(const Error& why);
 };
@@ -87,41 +96,60 @@ FieldSource::End HeldBone::Impl::follow(Backoff& backoff) {
 }
 
 Result<void> HeldBone::Impl::take(const v1::WatchFieldResponse& message) {
-  const MutexLock lock(mutex);
   if (ending) return failure(ErrorCode::unavailable, "it ends");
-  Result<void> taken = follower->take(message);
-  status.bytes = follower->bytes();
-  if (!taken || !follower->follows()) return taken;
-  if (status.state != HeldBoneState::follows) status.why.reset();
-  status.state = HeldBoneState::follows;
-  status.room_seq = follower->bone().room_seq();
-  status.bodies = follower->bone().bodies().size();
-  changed.notify_all();
+  HeldBoneStatus now;
+  now.state = HeldBoneState::follows;
+  bool follows = false;
+  const Result<void> taken = [&] {
+    const MutexLock lock(mutex);
+    Result<void> one = follower->take(message);
+    now.bytes = follower->bytes();
+    follows = one && follower->follows();
+    if (!follows) return one;
+    now.room_seq = follower->bone().room_seq();
+    now.bodies = follower->bone().bodies().size();
+    return one;
+  }();
+  const MutexLock lock(status_mutex);
+  now.asked_again = status.asked_again;
+  if (follows)
+    status = now;
+  else
+    status.bytes = now.bytes;
+  if (follows) changed.notify_all();
   return taken;
 }
 
 bool HeldBone::Impl::pause(Backoff& backoff) {
-  MutexLock lock(mutex);
-  changed.wait_for(lock, backoff.next(), [&]() OSTEON_REQUIRES(mutex) { return ending; });
+  MutexLock lock(status_mutex);
+  changed.wait_for(lock, backoff.next(), [&] { return ending.load(); });
   if (!ending) ++status.asked_again;
   return !ending;
 }
 
 void HeldBone::Impl::interrupt(const Error& why) {
-  const MutexLock lock(mutex);
+  const bool whole = has_bone();
   if (ending) return;
-  if (status.state == HeldBoneState::follows)
-    log::warn("the inside of the bone is asked for again", {{"reason", why.message}});
-  if (follower && follower->whole()) status.state = HeldBoneState::interrupted;
-  status.why = why;
-  changed.notify_all();
+  bool followed = false;
+  {
+    const MutexLock lock(status_mutex);
+    followed = status.state == HeldBoneState::follows;
+    if (whole) status.state = HeldBoneState::interrupted;
+    status.why = why;
+    changed.notify_all();
+  }
+  // Under no lock: the log has its own.
+  if (followed) log::warn("the inside of the bone is asked for again", {{"reason", why.message}});
 }
 
 void HeldBone::Impl::fail(const Error& why) {
-  const MutexLock lock(mutex);
-  if (ending) return;
+  {
+    const MutexLock lock(mutex);
+    if (ending) return;
+    follower.reset();
+  }
   log::warn("the inside of the bone is not shown", {{"reason", why.message}});
-  follower.reset();
+  const MutexLock lock(status_mutex);
   status.state = HeldBoneState::failed;
   status.bodies = status.bytes = 0;
   status.why = why;
@@ -136,14 +164,16 @@ std::unique_ptr<HeldBone> HeldBone::start(std::unique_ptr<FieldSource> source, c
   return bone;
 }
 
-HeldBone::~HeldBone() {
+HeldBone::~HeldBone() { end_and_join(); }
+
+void HeldBone::end_and_join() {
   end();
-  impl_->thread.join();
+  std::call_once(impl_->thread_joined, [this] { impl_->thread.join(); });
 }
 
 void HeldBone::end() {
   {
-    const MutexLock lock(impl_->mutex);
+    const MutexLock lock(impl_->status_mutex);  // for who is about to wait
     impl_->ending = true;
     impl_->changed.notify_all();
   }
@@ -151,7 +181,7 @@ void HeldBone::end() {
 }
 
 HeldBoneStatus HeldBone::status() const {
-  const MutexLock lock(impl_->mutex);
+  const MutexLock lock(impl_->status_mutex);
   return impl_->status;
 }
 
@@ -168,8 +198,9 @@ FieldChanges HeldBone::take_changes() {
 }
 
 bool HeldBone::wait(const std::function<bool(const HeldBoneStatus&)>& done, std::chrono::milliseconds patience) const {
-  MutexLock lock(impl_->mutex);
-  return impl_->changed.wait_for(lock, patience, [&]() OSTEON_REQUIRES(impl_->mutex) { return done(impl_->status); });
+  MutexLock lock(impl_->status_mutex);
+  return impl_->changed.wait_for(lock, patience,
+                                 [&]() OSTEON_REQUIRES(impl_->status_mutex) { return done(impl_->status); });
 }
 
 }  // namespace osteon

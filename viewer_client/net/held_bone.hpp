@@ -24,7 +24,7 @@ class FieldSource {
   virtual ~FieldSource() = default;
   // The bone before any cut. Errors: unavailable (asking again may help); all others are final.
   [[nodiscard]] virtual Result<Case> imported() = 0;
-  // Opens a stream, and reads it until it ends or `take` returns false.
+  // Opens a stream of the imported bone, and reads it until it ends or `take` returns false.
   [[nodiscard]] virtual End read(const std::function<bool(const v1::WatchFieldResponse&)>& take) = 0;
   // For good; imported() and read() return soon. Any thread.
   virtual void cancel() = 0;
@@ -60,14 +60,17 @@ class HeldBone {
   ~HeldBone();
   // Ends the stream; the bone stays as it is. Returns at once.
   void end();
+  // Also waits for the thread, which then uses the source no more. Whoever shares the bone may go on to read it.
+  void end_and_join();
 
+  // Returns at once. The bone may already be one event newer.
   [[nodiscard]] HeldBoneStatus status() const;
-  // Calls `use` with the bone at one event. Cuts wait meanwhile, and so does end(). `use` may take no lock but leaves.
-  // False: there is no bone.
+  // Calls `use` with the bone at one event. Waits while an event changes the bone, which takes long for the first
+  // leaves and for an undo; cuts wait for `use`. `use` may take no lock but leaves. False: there is no bone.
   bool read(const std::function<void(const Replica& bone)>& use) const;
-  // Where it has changed since the last call; everywhere at first.
+  // Where it has changed since the last call; everywhere at first. Waits as read() does.
   [[nodiscard]] FieldChanges take_changes();
-  // Waits until `done`. False: it was not within `patience`.
+  // Waits until `done`, which may take no lock. False: it was not within `patience`.
   bool wait(const std::function<bool(const HeldBoneStatus&)>& done, std::chrono::milliseconds patience) const;
 
  private:

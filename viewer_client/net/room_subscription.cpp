@@ -508,7 +508,7 @@ Result<std::unique_ptr<RoomSubscription>> RoomSubscription::start(const RoomSubs
 
 void RoomSubscription::end() {
   impl_->requests.cancel_all();
-  // Its lock comes before this one.
+  // Its lock has the rank of this one.
   if (const std::shared_ptr<HeldBone> held = held_bone()) held->end();
   const MutexLock lock(impl_->mutex);
   impl_->ending = true;
@@ -553,9 +553,13 @@ void RoomSubscription::hold_bone(bool wanted) {
     made = HeldBone::start(field_of_server({.room = [&at = *impl_] { return at.newest_join(); },
                                             .cache = impl_->options.cache,
                                             .patience = impl_->options.patience}));
-  const MutexLock lock(impl_->mutex);
-  std::swap(impl_->held, made);
-  if (impl_->ending && impl_->held) std::swap(impl_->held, made);
+  {
+    const MutexLock lock(impl_->mutex);
+    std::swap(impl_->held, made);
+    if (impl_->ending && impl_->held) std::swap(impl_->held, made);
+  }
+  // Somebody may share it, so it does not end with this pointer. Its source asks this subscription for the room.
+  if (made) made->end_and_join();
 }
 
 std::shared_ptr<HeldBone> RoomSubscription::held_bone() const {

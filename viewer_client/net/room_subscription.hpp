@@ -65,7 +65,8 @@ class RoomSubscription {
   void look(const ViewFrustum& from);
 
   // Whether a picture of the bone's inside is shown: then its case is fetched, and a fifth thread follows each cut. Off
-  // at first; nothing of it is sent or kept then. Waits for the end of that thread when it is switched off.
+  // at first; nothing of it is sent or kept then. Waits for the end of that thread when it is switched off, also if
+  // somebody still shares held_bone(): that bone stays as it is.
   void hold_bone(bool wanted);
   // Null while it is off. Shared with whoever looks at the bone at the moment.
   [[nodiscard]] std::shared_ptr<HeldBone> held_bone() const;

@@ -474,7 +474,8 @@ TEST(CallRates, LetThroughAsManyAsTheTimeAllows) {
 }
 
 TEST(CallRates, AReserveHasItsCallsAndNotOneMore) {
-  for (const char* method : {"/osteon.v1.RoomService/Join", "/osteon.v1.PeopleService/Say"}) {
+  for (const char* method :
+       {"/osteon.v1.RoomService/Join", "/osteon.v1.PeopleService/Say", "/osteon.v1.FieldService/WatchField"}) {
     const CallRate* rate = find_call_rate(method);
     ASSERT_NE(rate, nullptr);
     CallRates rates;
@@ -513,6 +514,11 @@ TEST(CallRates, AreThoseOfCallsThatThereAre) {
     EXPECT_NE(find_call_rate(std::string("/osteon.v1.RoomService/") + method), nullptr) << method;
   for (const char* method : {"Say", "Annotate", "Supervise", "Demonstrate"})
     EXPECT_NE(find_call_rate(std::string("/osteon.v1.PeopleService/") + method), nullptr) << method;
+  // What copies the whole bone for each call comes less often than what does not.
+  const CallRate *copies = find_call_rate("/osteon.v1.FieldService/WatchField"),
+                 *joins = find_call_rate("/osteon.v1.RoomService/Join");
+  EXPECT_LT(copies->per_second, joins->per_second);
+  EXPECT_LT(copies->at_once, joins->at_once);
 }
 
 TEST(RefusalLog, SaysEachOnceAndRemembersNoMoreThanItsLimit) {

@@ -226,6 +226,27 @@ TEST(SessionSendQueue, LeavesOutWhatHasArrived) {
   EXPECT_EQ(parsed(send_queue.take()).index(), 0u) << "an answer is not in the order of entries";
 }
 
+TEST(SessionSendQueue, CountsTheBytesThatWait) {
+  const Bytes entry = std::make_shared<const std::string>(300, 'x');
+  SessionSendQueue send_queue(1000);
+  send_queue.begin(RoomSeq{}, {}, nullptr, 77);
+  EXPECT_EQ(send_queue.leaf_bytes(), 77u) << "until they are given";
+  for (std::uint64_t seq = 1; seq <= 3; ++seq) EXPECT_TRUE(send_queue.add(RoomSeq{seq}, entry));
+  EXPECT_FALSE(send_queue.add(RoomSeq{4}, entry));
+  EXPECT_EQ(send_queue.waiting(), 3u);
+  FieldLeaf leaf;
+  leaf.values.resize(kLeafVoxels);
+  send_queue.set_leaves({leaf});
+  EXPECT_EQ(send_queue.leaf_bytes(), 1024u);
+  EXPECT_FALSE(send_queue.take().empty());
+  EXPECT_EQ(send_queue.leaf_bytes(), 0u);
+  EXPECT_FALSE(send_queue.take().empty());
+  EXPECT_TRUE(send_queue.add(RoomSeq{4}, entry)) << "one was sent";
+  EXPECT_FALSE(send_queue.add(RoomSeq{5}, entry));
+  (void)send_queue.arrived(3);
+  EXPECT_TRUE(send_queue.add(RoomSeq{5}, entry)) << "two have arrived by another way";
+}
+
 TEST(SessionSendQueue, GivesUpAReaderThatIsTooFarBehind) {
   SessionSendQueue send_queue;
   send_queue.begin(RoomSeq{0}, {}, complete(0));

@@ -3,7 +3,13 @@
 #include <gtest/gtest.h>
 
 #include <array>
+#include <atomic>
+#include <functional>
+#include <memory>
+#include <string>
 #include <thread>
+#include <utility>
+#include <vector>
 
 #include "common/field/kernel.hpp"
 #include "osteon/v1/field.grpc.pb.h"
@@ -72,6 +78,27 @@ TEST_F(ServedField, WhoComesLateWhileTwoHandsCutEndsWithTheRoomsBone) {
   EXPECT_EQ(viewer.held_bone(), nullptr);
 }
 
+TEST_F(ServedField, WhatIsSwitchedOffEndsAlthoughSomebodySharesIt) {
+  RenderQueue queue;
+  auto joined = RoomSubscription::start({.address = address(), .cache = dir_ / "viewers"}, queue, [] { return false; });
+  ASSERT_TRUE(joined) << joined.error().message;
+  const auto follows = [](const HeldBoneStatus& now) { return now.state == HeldBoneState::follows; };
+  (*joined)->hold_bone(true);
+  const auto older = (*joined)->held_bone();
+  ASSERT_TRUE(older->wait(follows, kPatience));
+  (*joined)->hold_bone(false);
+  (*joined)->hold_bone(true);
+  const auto newer = (*joined)->held_bone();
+  ASSERT_NE(newer, older);
+  ASSERT_TRUE(newer->wait(follows, kPatience));
+  // Else the two would replace each other: the server gives an author one stream.
+  EXPECT_FALSE(older->wait([](const HeldBoneStatus& now) { return now.asked_again > 0; }, 1s));
+  EXPECT_EQ(newer->status().asked_again, 0u);
+  joined->reset();
+  for (const auto& bone : {older, newer})
+    EXPECT_TRUE(bone->read([&](const Replica& held) { EXPECT_EQ(held.hash(), runtime().bone_status().field_hash); }));
+}
+
 TEST_F(ServedField, ANewerStreamOfAViewerReplacesTheOneBefore) {
   const wire::JoinedRoom room = join(address(), wire::ClientKind::viewer);
   v1::WatchFieldRequest request;
@@ -90,6 +117,38 @@ TEST_F(ServedField, ANewerStreamOfAViewerReplacesTheOneBefore) {
   EXPECT_THAT(end.error_message(), HasSubstr("has replaced it"));
   second.TryCancel();
   (void)newer->Finish();
+}
+
+TEST_F(ServedField, AsksAgainWhileTheRoomMayComeBackAndNeverAfterItsEnd) {
+  const wire::JoinedRoom room = join(address(), wire::ClientKind::viewer);
+  const auto held = HeldBone::start(field_of_server({.room = [=] { return room; }, .cache = dir_ / "viewers"}),
+                                    {.pause = 5ms, .longest_pause = 20ms});
+  ASSERT_TRUE(held->wait([](const HeldBoneStatus& now) { return now.state == HeldBoneState::follows; }, kPatience));
+  runtime().send_away("the server stops for a moment");
+  ASSERT_TRUE(held->wait(
+      [](const HeldBoneStatus& now) { return now.state == HeldBoneState::interrupted && now.asked_again > 2; },
+      kPatience));
+  runtime().end_streams("the room takes no more cuts");
+  ASSERT_TRUE(held->wait([](const HeldBoneStatus& now) { return now.state == HeldBoneState::failed; }, kPatience));
+  EXPECT_EQ(held->status().why->message, "the room takes no more cuts");
+}
+
+TEST_F(ServedField, LeavesOfAnotherCaseAreNeverAsked) {
+  const wire::JoinedRoom room = join(address(), wire::ClientKind::viewer);
+  std::atomic<bool> other{false};
+  const auto newest = [&] {
+    wire::JoinedRoom now = room;
+    if (other) now.case_hash = Digest{{7}};
+    return now;
+  };
+  const auto held = HeldBone::start(field_of_server({.room = newest, .cache = dir_ / "viewers"}),
+                                    {.pause = 5ms, .longest_pause = 20ms});
+  ASSERT_TRUE(held->wait([](const HeldBoneStatus& now) { return now.state == HeldBoneState::follows; }, kPatience));
+  other = true;
+  const auto newer = HeldBone::start(field_of_server({.room = [&] { return room; }, .cache = dir_ / "viewers"}));
+  ASSERT_TRUE(held->wait([](const HeldBoneStatus& now) { return now.state == HeldBoneState::failed; }, kPatience))
+      << "the newer stream has ended the older one, which has asked again";
+  EXPECT_THAT(held->status().why->message, HasSubstr("another case"));
 }
 
 TEST_F(ServedField, SoManyMayReadAtOnce) {
@@ -142,6 +201,45 @@ TEST_F(ServedField, RefusesStrangersAndOtherKernels) {
                       {.pause = 5ms, .longest_pause = 20ms});
   ASSERT_TRUE(held->wait([](const HeldBoneStatus& now) { return now.state == HeldBoneState::failed; }, kPatience));
   EXPECT_THAT(held->status().why->message, HasSubstr("call Join first"));
+}
+
+// Answers each call by its number, from 1 on.
+class NumberedAnswers final : public v1::FieldService::Service {
+ public:
+  explicit NumberedAnswers(std::function<grpc::Status(int)> answer) : answer_(std::move(answer)) {}
+  grpc::Status WatchField(grpc::ServerContext*, const v1::WatchFieldRequest*,
+                          grpc::ServerWriter<v1::WatchFieldResponse>*) override {
+    return answer_(++calls);
+  }
+  std::atomic<int> calls{0};
+
+ private:
+  std::function<grpc::Status(int)> answer_;
+};
+
+TEST(FieldSource, APauseOfTheServerIsNoRefusal) {
+  constexpr auto kRefused = 100ms;
+  NumberedAnswers service([&](int call) {
+    if (call == 2) std::this_thread::sleep_for(2 * kRefused);
+    const bool refuses = call == 1 || call == 3;
+    return grpc::Status(refuses ? grpc::StatusCode::NOT_FOUND : grpc::StatusCode::UNAVAILABLE, "not now");
+  });
+  int port = 0;
+  grpc::ServerBuilder builder;
+  builder.AddListeningPort("127.0.0.1:0", grpc::InsecureServerCredentials(), &port);
+  builder.RegisterService(&service);
+  const std::unique_ptr<grpc::Server> server = builder.BuildAndStart();
+  const TempDir cache;
+  const Case bone = test_block();
+  ASSERT_TRUE(bone.save(cache / to_hex(bone.hash())));
+  wire::JoinedRoom room;
+  room.channel = grpc::CreateChannel("127.0.0.1:" + std::to_string(port), grpc::InsecureChannelCredentials());
+  room.case_hash = bone.hash();
+  const auto held =
+      HeldBone::start(field_of_server({.room = [&] { return room; }, .cache = cache / "", .patience = kRefused}),
+                      {.pause = 1ms, .longest_pause = 2ms});
+  EXPECT_TRUE(wait_until([&] { return service.calls >= 5; }, kPatience)) << "it was refused twice, each for a moment";
+  EXPECT_NE(held->status().state, HeldBoneState::failed);
 }
 
 }  // namespace

@@ -247,6 +247,18 @@ TEST_F(Following, RefusesWhatNoServerSends) {
   EXPECT_THAT(follower_.take(wrong).error().message, HasSubstr("a tool that was not sent"));
   EXPECT_EQ(follower_.bone().hash(), before);
 
+  // Cuts that would keep the viewer computing for ever.
+  for (const auto& [x, sentence] : {std::pair(1 << 30, "far from the bone"), std::pair(300 << 10, "longer than any")}) {
+    (void)follow();
+    v1::WatchFieldResponse cut = messages.at(0);
+    cut.mutable_committed()->set_room_seq(room_.status().room_seq.value + 1);
+    v1::QuantisedPose& end = *cut.mutable_committed()->mutable_cut()->add_path();
+    end = cut.committed().cut().path(0);
+    end.set_position(0, x);
+    EXPECT_THAT(follower_.take(cut).error().message, HasSubstr(sentence));
+  }
+  EXPECT_EQ(follower_.bone().hash(), room_.status().field_hash);
+
   follower_.begin();
   EXPECT_THAT(follower_.take(messages.at(0)).error().message, HasSubstr("before the leaves were complete"));
   v1::WatchFieldResponse nobody;
@@ -261,7 +273,7 @@ TEST_F(Following, RefusesWhatNoServerSends) {
   leaf.mutable_leaf()->mutable_origin()->set_x(1 << 30);
   follower_.begin();
   EXPECT_THAT(follower_.take(leaf).error().message, HasSubstr("far from the bone"));
-  EXPECT_EQ(follower_.bone().hash(), before) << "what was refused changed nothing";
+  EXPECT_EQ(follower_.bone().hash(), room_.status().field_hash) << "what was refused changed nothing";
 
   // A change in two parts, the second of which is missing.
   (void)follow();

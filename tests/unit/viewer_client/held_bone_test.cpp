@@ -7,6 +7,7 @@
 #include <condition_variable>
 #include <deque>
 #include <functional>
+#include <future>
 #include <mutex>
 #include <utility>
 
@@ -178,6 +179,22 @@ TEST_F(Held, EndsWhileItReads) {
   expect_bone(*held, room_.status());
   held.reset();
   EXPECT_TRUE(calls_.cancelled);
+}
+
+// A picture of a large bone, or an undo, takes long. A window asks for the status, or closes, meanwhile.
+TEST_F(Held, AnswersAndEndsWhileTheBoneIsInUse) {
+  const auto held = hold({{beginning()}});
+  ASSERT_TRUE(reaches(*held, HeldBoneState::follows));
+  std::future<HeldBoneState> told;
+  std::future<void> ended;
+  ASSERT_TRUE(held->read([&](const Replica&) {
+    told = std::async(std::launch::async, [&] { return held->status().state; });
+    EXPECT_EQ(told.wait_for(10s), std::future_status::ready);
+    ended = std::async(std::launch::async, [&] { held->end(); });
+    EXPECT_EQ(ended.wait_for(10s), std::future_status::ready);
+  }));
+  EXPECT_EQ(told.get(), HeldBoneState::follows);
+  ended.get();
 }
 
 }  // namespace
