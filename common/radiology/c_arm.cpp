@@ -3,8 +3,30 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <string>
 
 namespace osteon::radiology {
+namespace {
+
+Result<void> check(const CArm& arm) {
+  const auto field = [](const char* name) { return "the C-arm's " + std::string(name); };
+  for (const auto& [name, value] :
+       {std::pair{"isocentre_mm", &arm.isocentre_mm}, {"translation_mm", &arm.translation_mm}})
+    if (!(value->cwiseAbs().maxCoeff() <= kMostOfCArm_mm && value->allFinite()))
+      return bad_field(field(name), "must have three numbers of at most 1 km");
+  for (const auto& [name, value] : {std::pair{"orbit_rad", arm.orbit_rad}, {"tilt_rad", arm.tilt_rad}})
+    if (!std::isfinite(value)) return bad_field(field(name), "must be a number, in radians");
+  for (const auto& [name, value] : {std::pair{"source_detector_mm", arm.source_detector_mm},
+                                    {"source_isocentre_mm", arm.source_isocentre_mm},
+                                    {"detector_mm", arm.detector_mm}})
+    if (!(value > 0.0 && value <= kMostOfCArm_mm)) return bad_field(field(name), "must be above 0 and at most 1 km");
+  for (const auto& [name, value] : {std::pair{"columns", arm.columns}, {"rows", arm.rows}})
+    if (value < 1 || value > kMostPixelsOfSide)
+      return bad_field(field(name), "must be from 1 to " + std::to_string(kMostPixelsOfSide));
+  return {};
+}
+
+}  // namespace
 
 PixelBox shadow_of(const Box& box, const ConeBeam& beam) {
   const PixelGrid& grid = beam.detector;
@@ -49,15 +71,16 @@ CArm c_arm_at(View view, const Vec3& isocentre_mm) {
   return arm;
 }
 
-ConeBeam beam_of(const CArm& arm) {
+Result<ConeBeam> beam_of(const CArm& arm) {
+  if (auto good = check(arm); !good) return tl::unexpected(std::move(good).error());
   const Eigen::Matrix3d turn =
       (Eigen::AngleAxisd(arm.orbit_rad, Vec3::UnitZ()) * Eigen::AngleAxisd(-arm.tilt_rad, Vec3::UnitX()))
           .toRotationMatrix();
   const Vec3 right = turn.col(0), down = -turn.col(2), to_detector = -turn.col(1);
   const Vec3 centre = arm.isocentre_mm + arm.translation_mm;
   const Vec3 source = centre - arm.source_isocentre_mm * to_detector;
-  return {source, grid_about(source + arm.source_detector_mm * to_detector, right, down, arm.detector_mm / arm.columns,
-                             arm.columns, arm.rows)};
+  return ConeBeam{source, grid_about(source + arm.source_detector_mm * to_detector, right, down,
+                                     arm.detector_mm / arm.columns, arm.columns, arm.rows)};
 }
 
 }  // namespace osteon::radiology

@@ -2,6 +2,7 @@
 #pragma once
 #include <optional>
 
+#include "common/core/result.hpp"
 #include "common/geometry/lattice.hpp"
 #include "common/radiology/pixel_grid.hpp"
 
@@ -35,6 +36,10 @@ struct CArm {
 enum class View { anteroposterior, lateral, axial };
 [[nodiscard]] CArm c_arm_at(View view, const Vec3& isocentre_mm);
 
-[[nodiscard]] ConeBeam beam_of(const CArm& arm);
+// Error: invalid_input, naming the field: a length or an angle that is no number, a distance or a width that is not
+// above zero, or a side of the image that is not from 1 to kMostPixelsOfSide.
+[[nodiscard]] Result<ConeBeam> beam_of(const CArm& arm);
+inline constexpr int kMostPixelsOfSide = 8192;
+inline constexpr double kMostOfCArm_mm = 1e6;  // of any length
 
 }  // namespace osteon::radiology

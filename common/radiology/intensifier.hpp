@@ -1,5 +1,7 @@
 // What an image intensifier shows of the rays that got through: photons with their noise, glare, and grey values. Each
 // is a step of its own.
+//
+// check() refuses settings from outside that the steps cannot work with. The steps themselves rely on it.
 #pragma once
 #include <cstdint>
 #include <span>
@@ -13,6 +15,8 @@ namespace osteon::radiology {
 struct Exposure {
   double air_kerma_at_metre_ugy = 2.0;
 };
+// Error: invalid_input, naming the field, as of the two below.
+[[nodiscard]] Result<void> check(const Exposure& exposure);
 
 // Nominal dose-area product of one pulse, Gy cm²: air kerma times area of the beam. It is the same at every distance
 // from the source. Nominal, because it follows from the setting alone.
@@ -24,6 +28,7 @@ struct Intensifier {
   double glare = 0.1;           // part of the light that spreads over the whole image
   double glare_radius_mm = 40;  // on the detector: half the side of the square over which it spreads
 };
+[[nodiscard]] Result<void> check(const Intensifier& intensifier);
 
 // Mean number of photons that each pixel counts: the kerma without a patient at the pixel, by the inverse square of the
 // distance and the cosine of incidence, times exp(−attenuation).
@@ -41,6 +46,8 @@ struct Contrast {
   float black = 1.0f, white = 1000.0f;
   bool inverted = false;  // dense matter is white, as on film
 };
+// White must be a hundredth above black, at least.
+[[nodiscard]] Result<void> check(const Contrast& contrast);
 // As automatic brightness control sets it: the darkest and the brightest hundredth of the image are black and white.
 [[nodiscard]] Contrast automatic_contrast(std::span<const float> photons);
 [[nodiscard]] std::vector<std::uint8_t> grey_of(std::span<const float> photons, const Contrast& contrast);

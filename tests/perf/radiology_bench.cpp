@@ -66,7 +66,7 @@ int measure(const Case& bone, const CaseScan* scan, int turns) {
     return 1;
   }
   const Vec3 entry = entry_of(bone), axis = Vec3::UnitY();
-  const radiology::ConeBeam beam = radiology::beam_of(radiology::c_arm_at(radiology::View::lateral, entry));
+  const radiology::ConeBeam beam = *radiology::beam_of(radiology::c_arm_at(radiology::View::lateral, entry));
   radiology::Radiograph image(beam);
   baselines::VtkRadiograph vtk(*made, beam);
   baselines::VtkSlices vtk_slices(*made);

@@ -4,11 +4,13 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <limits>
 #include <numeric>
 
 #include "common/radiology/attenuation.hpp"
 #include "common/radiology/metal.hpp"
 #include "common/tools/tool_solid.hpp"
+#include "tests/unit/radiology/beams.hpp"
 
 namespace osteon::radiology {
 namespace {
@@ -18,7 +20,7 @@ ConeBeam coarse_beam() {
   arm.detector_mm = 120.0;
   arm.columns = 120;
   arm.rows = 90;
-  return beam_of(arm);
+  return good_beam(arm);
 }
 
 double mean_of(std::span<const float> values) {
@@ -74,7 +76,7 @@ TEST(Intensifier, PhotonsFollowTheLawOfBeerAndLambert) {
   far.rows = 90;
   far.source_detector_mm = 2000.0;
   const float middle = open[beam.detector.index(60, 45)];
-  EXPECT_NEAR(photons_at(beam_of(far), none, {}, {})[beam.detector.index(60, 45)] / middle, 0.25f, 1e-3f);
+  EXPECT_NEAR(photons_at(good_beam(far), none, {}, {})[beam.detector.index(60, 45)] / middle, 0.25f, 1e-3f);
 }
 
 TEST(Intensifier, DoseAreaDoesNotDependOnTheDistance) {
@@ -83,10 +85,10 @@ TEST(Intensifier, DoseAreaDoesNotDependOnTheDistance) {
   arm.rows = 100;
   arm.detector_mm = 100.0;
   // 2 µGy at 1 m on 100 cm².
-  EXPECT_NEAR(dose_area_gy_cm2(beam_of(arm), {2.0}), 2e-4, 1e-12);
+  EXPECT_NEAR(dose_area_gy_cm2(good_beam(arm), {2.0}), 2e-4, 1e-12);
   arm.source_detector_mm = 500.0;
   arm.detector_mm = 50.0;  // the same cone
-  EXPECT_NEAR(dose_area_gy_cm2(beam_of(arm), {2.0}), 2e-4, 1e-12);
+  EXPECT_NEAR(dose_area_gy_cm2(good_beam(arm), {2.0}), 2e-4, 1e-12);
 }
 
 // Mean and variance of a Poisson distribution are equal. Bounds: four standard errors.
@@ -137,6 +139,46 @@ TEST(Intensifier, GreyFollowsTheLogarithm) {
   // An image of one value, such as air.
   EXPECT_GT(automatic_contrast(std::vector<float>(9, 5.0f)).white,
             automatic_contrast(std::vector<float>(9, 5.0f)).black);
+}
+
+template <class Settings>
+void expect_refused(const Settings& settings, const char* field) {
+  const Result<void> good = check(settings);
+  ASSERT_FALSE(good.has_value()) << field;
+  EXPECT_EQ(good.error().code, ErrorCode::invalid_input);
+  EXPECT_NE(good.error().message.find(field), std::string::npos) << good.error().message;
+}
+
+TEST(Intensifier, RefusesSettingsAndNamesTheField) {
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  const float nanf = std::numeric_limits<float>::quiet_NaN();
+  for (const double kerma : {-1.0, nan, 1e300}) expect_refused(Exposure{kerma}, "air_kerma_at_metre_ugy");
+  for (const double part : {-0.1, 0.0, 1.1, nan}) expect_refused(Intensifier{.detected = part}, "detected");
+  for (const double part : {-0.1, 1.1, nan}) expect_refused(Intensifier{.glare = part}, "glare");
+  for (const double mm : {-2.0, nan, 1e300}) expect_refused(Intensifier{.glare_radius_mm = mm}, "glare_radius_mm");
+  for (const float black : {0.0f, -1.0f, nanf}) expect_refused(Contrast{black, 1000.0f, false}, "black");
+  for (const float white : {5.0f, 5.01f, nanf}) expect_refused(Contrast{5.0f, white, false}, "white");
+  EXPECT_TRUE(check(Exposure{}).has_value() && check(Intensifier{}).has_value() && check(Contrast{}).has_value());
+}
+
+// Nothing is read beside the image, whatever the radius: all light of one pixel stays in it, or leaves the image.
+TEST(Intensifier, GlareOfAnyRadiusStaysWithinTheImage) {
+  const PixelGrid detector = grid_about(Vec3::Zero(), Vec3::UnitX(), Vec3::UnitY(), 1.0, 20, 10);
+  for (const double radius : {0.0, 0.9, 19.0, 1e6}) {
+    std::vector<float> photons(detector.count(), 7.0f);
+    add_glare(detector, {.detected = 1.0, .glare = 1.0, .glare_radius_mm = radius}, photons);
+    for (const float n : photons) ASSERT_TRUE(n >= 0.0f && n <= 7.0f);
+    if (radius < 1.0) {
+      EXPECT_EQ(photons, std::vector<float>(detector.count(), 7.0f));
+    }
+  }
+}
+
+TEST(IntensifierDeathTest, StepsRelyOnCheckedSettings) {
+  const PixelGrid detector = grid_about(Vec3::Zero(), Vec3::UnitX(), Vec3::UnitY(), 1.0, 20, 10);
+  std::vector<float> photons(detector.count(), 7.0f);
+  EXPECT_DEATH(add_glare(detector, {.glare_radius_mm = -2.0}, photons), "check");
+  EXPECT_DEATH((void)grey_of(photons, {0.0f, 5.0f, false}), "check");
 }
 
 }  // namespace

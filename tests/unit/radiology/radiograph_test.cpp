@@ -15,6 +15,7 @@
 #include "common/radiology/sampling.hpp"
 #include "common/tools/implicit.hpp"
 #include "tests/support/scenes/random_cuts.hpp"
+#include "tests/unit/radiology/beams.hpp"
 
 namespace osteon::radiology {
 namespace {
@@ -50,7 +51,7 @@ ConeBeam small_beam(double orbit_rad = 0.3, double tilt_rad = 0.2) {
   arm.detector_mm = 80.0;
   arm.columns = 96;
   arm.rows = 72;
-  return beam_of(arm);
+  return good_beam(arm);
 }
 
 // Length of a line in a solid that is the part of space between the two roots of a quadratic in the line's position.
@@ -214,7 +215,7 @@ TEST(Radiograph, HoldsTheWholeBone) {
   arm.source_detector_mm = 1e5 + 100.0;
   arm.detector_mm = 16.0;
   arm.columns = arm.rows = 64;
-  const Radiograph image = image_of(bone, beam_of(arm));
+  const Radiograph image = image_of(bone, good_beam(arm));
   double pixels = 0.0;
   for (const float a : image.attenuation()) pixels += static_cast<double>(a) * 0.25 * 0.25;
   EXPECT_NEAR(pixels, voxels, 0.003 * voxels);
@@ -255,7 +256,7 @@ TEST(Radiograph, DoesNotDependOnThreadsNorWidths) {
   arm.detector_mm = 60.0;
   arm.columns = 101;
   arm.rows = 77;
-  const ConeBeam beam = beam_of(arm);
+  const ConeBeam beam = good_beam(arm);
   const Radiograph all = image_of(bone, beam);
   {
     const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
