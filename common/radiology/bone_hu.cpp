@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 
 #include "common/core/check.hpp"
 #include "common/core/large_pages.hpp"
@@ -18,10 +17,8 @@ std::size_t samples_in(const CoordBox& box) {
   return to_index(d.x) * to_index(d.y) * to_index(d.z);
 }
 
-std::uint16_t to_steps(double hu, float part = 1.0f) {
-  constexpr float most = std::numeric_limits<std::uint16_t>::max();
-  const auto steps = static_cast<float>(attenuation_per_mm(hu) / kStep_per_mm);
-  return static_cast<std::uint16_t>(std::min(part * steps, most - 0.5f) + 0.5f);
+std::uint16_t rounded_steps(double per_mm) {
+  return static_cast<std::uint16_t>(std::min(per_mm / kStep_per_mm, kMostSteps - 0.5) + 0.5);
 }
 
 // The part of a sample's voxel that is solid, from the distance to the surface.
@@ -165,6 +162,7 @@ Result<BoneHu> BoneHu::make(const Case& bone, const CaseScan* scan) {
     made.fill_from_scan(*scan);
   else
     made.fill_from_density();
+  made.fill_metal();
   made.steps_ = made.uncut_;
   made.note_occupied(box);
   return made;
@@ -186,7 +184,8 @@ void BoneHu::fill_from_density() {
       for (std::int32_t y = part.min.y; y <= part.max.y; ++y) {
         std::uint16_t* to = uncut_.data() + index({x, y, part.min.z});
         for (std::int32_t z = part.min.z; z <= part.max.z; ++z, ++i, ++to)
-          *to = to_steps(static_cast<double>((density[i] - intercept) / slope), solid_part(surface[i], pitch));
+          *to = rounded_steps(static_cast<double>(solid_part(surface[i], pitch)) *
+                              radiology::attenuation_per_mm(static_cast<double>((density[i] - intercept) / slope)));
       }
   });
 }
@@ -199,9 +198,39 @@ void BoneHu::fill_from_scan(const CaseScan& scan) {
       std::uint16_t* to = uncut_.data() + index({x, y, box_.min.z});
       for (std::int32_t z = box_.min.z; z <= box_.max.z; ++z, ++to) {
         const Vec3 voxel = to_voxels * (position_mm({x, y, z}, pitch_mm()) - scan.geometry.origin_mm);
-        *to = to_steps(static_cast<double>(scan_hu(scan, voxel)));
+        *to = rounded_steps(radiology::attenuation_per_mm(static_cast<double>(scan_hu(scan, voxel))));
       }
     }
+}
+
+// Neither density, which ends at compact bone, nor the HU of most scanners tell how dense metal is. Only samples within
+// the surface are labelled. So a sample of the skin is metal if one beside it is.
+void BoneHu::fill_metal() {
+  std::vector<float> surface;
+  const auto is_metal = [&](Coord sample, float distance_mm) {
+    if (distance_mm < 0.0f) return bone_.tissue(sample) == Tissue::metal;
+    bool any = false;
+    for (std::int32_t n = 0; n < 27; ++n)
+      any |= bone_.tissue(sample + Coord{n / 9 - 1, n / 3 % 3 - 1, n % 3 - 1}) == Tissue::metal;
+    return any;
+  };
+  for (const Coord leaf : bone_.metal_leaves()) {
+    const std::int32_t last = kLeafSize - 1;
+    // The skin may be in the next leaf. A sample that two leaves reach is filled twice, with the same value.
+    const CoordBox part = intersection(CoordBox{leaf, leaf + Coord{last, last, last}}.grown(1), box_);
+    if (part.empty()) continue;
+    surface.resize(samples_in(part));
+    bone_.gather_surface(part, surface);
+    std::size_t i = 0;
+    for (std::int32_t x = part.min.x; x <= part.max.x; ++x)
+      for (std::int32_t y = part.min.y; y <= part.max.y; ++y) {
+        std::uint16_t* to = uncut_.data() + index({x, y, part.min.z});
+        for (std::int32_t z = part.min.z; z <= part.max.z; ++z, ++i, ++to) {
+          const double solid = static_cast<double>(solid_part(surface[i], static_cast<float>(pitch_mm())));
+          if (solid > 0.0 && is_metal({x, y, z}, surface[i])) *to = std::max(*to, rounded_steps(solid * kMetal_per_mm));
+        }
+      }
+  }
 }
 
 std::size_t BoneHu::index(Coord sample) const {

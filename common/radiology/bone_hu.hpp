@@ -29,7 +29,8 @@ struct HuLattice {
 class BoneHu {
  public:
   // The bone before any cut. With a scan: its HU, trilinear, air beyond it. Otherwise from the density, and air is
-  // where no bone is; a sample within half a pitch of the surface is partly bone. Errors: invalid_input (a scan without
+  // where no bone is; a sample within half a pitch of the surface is partly bone. What the case has as metal is metal
+  // in both (kMetal_per_mm). Errors: invalid_input (a scan without
   // HU), exhausted (more samples than kMostHuSamples).
   [[nodiscard]] static Result<BoneHu> make(const Case& bone, const CaseScan* scan = nullptr);
 
@@ -54,6 +55,7 @@ class BoneHu {
   BoneHu(Case bone, const CoordBox& box);
   void fill_from_density();
   void fill_from_scan(const CaseScan& scan);
+  void fill_metal();
   void restore(const CoordBox& box);
   void cut(std::span<const CutField* const> bodies, const CoordBox& box);
   CoordBox renew_box(std::span<const CutField* const> bodies, const CoordBox& box);
