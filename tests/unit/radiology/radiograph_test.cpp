@@ -14,6 +14,7 @@
 #include "common/radiology/attenuation.hpp"
 #include "common/radiology/sampling.hpp"
 #include "common/tools/implicit.hpp"
+#include "common/volume/fragments.hpp"
 #include "tests/support/scenes/random_cuts.hpp"
 #include "tests/unit/radiology/beams.hpp"
 
@@ -242,6 +243,92 @@ TEST(Radiograph, RaysCastAgainEqualAllRays) {
   fresh.renew(std::vector<const CutField*>{&field});
   EXPECT_TRUE(std::ranges::equal(again.attenuation(), image_of(fresh, beam).attenuation()));
   EXPECT_FALSE(std::ranges::equal(again.attenuation(), image_of(hu_of(field.bone()), beam).attenuation()));
+}
+
+// Of the whole bone, 1/mm · mm³.
+double mass_of(const BoneHu& bone) {
+  const CoordBox& box = bone.box();
+  const double h = bone.pitch_mm();
+  double sum = 0.0;
+  for (std::int32_t x = box.min.x; x <= box.max.x; ++x)
+    for (std::int32_t y = box.min.y; y <= box.max.y; ++y)
+      for (std::int32_t z = box.min.z; z <= box.max.z; ++z) sum += bone.attenuation_per_mm({x, y, z}) * h * h * h;
+  return sum;
+}
+
+std::span<const std::uint16_t> steps_of(const BoneHu& bone) {
+  const HuLattice lattice = bone.lattice();
+  return {lattice.steps, to_index(lattice.dims.x) * to_index(lattice.dims.y) * to_index(lattice.dims.z)};
+}
+
+// A block, and the replica of a client that the room tells of a slot through it, of two bodies, and of one again.
+struct SawnBlock {
+  Case bone = test::plain_block(16.0, 8.0, 0.5);
+  Replica replica{bone, BodyId{}};
+  CutField field{bone, BodyId{}};  // the room's
+  FragmentFinder finder{field};
+  std::uint64_t seq = 0;
+  double piece_mm3 = 0.0;
+
+  // Five millimetres wide, right of the middle.
+  void saw() {
+    for (double z = -1.0; z >= -10.0; z -= 1.5)
+      for (double y = -10.0; y < 10.0; y += 4.0) {
+        ++seq;
+        const Cut cut = test::straight_cut(*find_tool("burr-round-5"), {3, y, z}, {3, y + 4.0, z}, {0, 0, -1}, seq);
+        finder.touch(field, cut.level, field.apply(cut).changed_leaves);
+        replica.commit(RoomSeq{seq}, cut, false);
+      }
+  }
+  void split() {
+    const std::vector<Fragment> pieces = finder.take_fragments(field);
+    ASSERT_EQ(pieces.size(), 1U);
+    piece_mm3 = pieces.front().volume_mm3;
+    CutField piece(bone, BodyId{1});
+    const auto of_piece = [](FieldLeaf leaf) {
+      leaf.body = BodyId{1};
+      return leaf;
+    };
+    for (const FieldLeaf& leaf : field.leaves()) piece.restore(of_piece(leaf));
+    for (const FieldLeaf& leaf : pieces.front().left) piece.merge(of_piece(leaf));
+    for (const FieldLeaf& leaf : pieces.front().taken) field.merge(leaf);
+    std::vector<FieldLeaf> sent = field.leaves();
+    std::ranges::copy(piece.leaves(), std::back_inserter(sent));
+    tell({BodyId{}, BodyId{1}}, sent);
+  }
+  void take_piece_away() { tell({BodyId{}}, {}); }
+
+ private:
+  void tell(const std::vector<BodyId>& bodies, const std::vector<FieldLeaf>& leaves) {
+    replica.change(RoomSeq{++seq}, bodies, leaves);
+    replica.settle();
+  }
+};
+
+TEST(Radiograph, ASawnPieceStaysUntilItIsTakenAway) {
+  SawnBlock block;
+  BoneHu bone = hu_of(block.bone);
+  const ConeBeam beam = small_beam(0.4, 0.3);
+  Radiograph again = image_of(bone, beam);
+  const auto follow = [&] {
+    again.recast(bone, bone.update(block.replica.bodies(), block.replica.take_changes()));
+    BoneHu fresh = hu_of(block.bone);
+    fresh.renew(block.replica.bodies());
+    EXPECT_TRUE(std::ranges::equal(steps_of(bone), steps_of(fresh)));
+    EXPECT_TRUE(std::ranges::equal(again.attenuation(), image_of(fresh, beam).attenuation()));
+    return mass_of(bone);
+  };
+  const double per_mm = mass_of(bone) / (16.0 * 16.0 * 8.0);
+  block.saw();
+  const double sawn = follow();
+  block.split();
+  ASSERT_EQ(block.replica.bodies().size(), 2U);
+  EXPECT_NEAR(follow(), sawn, 0.005 * sawn);  // a split takes nothing away
+  block.take_piece_away();
+  ASSERT_EQ(block.replica.bodies().size(), 1U);
+  // The piece is all right of the slot: some 2.5 x 16 x 8 mm.
+  EXPECT_NEAR(block.piece_mm3, 320.0, 40.0);
+  EXPECT_NEAR(sawn - follow(), per_mm * block.piece_mm3, 0.03 * per_mm * block.piece_mm3);
 }
 
 // The same with a beam in which the rays have different dominant axes.
