@@ -30,7 +30,7 @@ Result<void> check(const CArm& arm) {
 
 PixelBox shadow_of(const Box& box, const ConeBeam& beam) {
   const PixelGrid& grid = beam.detector;
-  const PixelBox all{0, 0, grid.columns - 1, grid.rows - 1};
+  const PixelBox all = grid.whole();
   Vec3 normal = grid.column_mm.cross(grid.row_mm).normalized();
   double distance = normal.dot(grid.first_mm - beam.source_mm);
   if (distance < 0.0) {
@@ -54,13 +54,10 @@ PixelBox shadow_of(const Box& box, const ConeBeam& beam) {
   }
   // One pixel more on each side, for rounding.
   const auto pixel = [](double at, int last) { return static_cast<int>(std::clamp(at, -1.0, last + 1.0)); };
-  PixelBox shadow{pixel(std::floor(low_column) - 1.0, all.last_column), pixel(std::floor(low_row) - 1.0, all.last_row),
-                  pixel(std::ceil(high_column) + 1.0, all.last_column), pixel(std::ceil(high_row) + 1.0, all.last_row)};
-  shadow.first_column = std::max(shadow.first_column, 0);
-  shadow.first_row = std::max(shadow.first_row, 0);
-  shadow.last_column = std::min(shadow.last_column, all.last_column);
-  shadow.last_row = std::min(shadow.last_row, all.last_row);
-  return shadow;
+  const PixelBox shadow{
+      pixel(std::floor(low_column) - 1.0, all.last_column), pixel(std::floor(low_row) - 1.0, all.last_row),
+      pixel(std::ceil(high_column) + 1.0, all.last_column), pixel(std::ceil(high_row) + 1.0, all.last_row)};
+  return shadow.common(all);
 }
 
 CArm c_arm_at(View view, const Vec3& isocentre_mm) {

@@ -103,30 +103,33 @@ double dose_area_gy_cm2(const ConeBeam& beam, const Exposure& exposure) {
   return exposure.air_kerma_at_metre_ugy * 1e-6 * area_mm2 * at_metre * at_metre * 0.01;
 }
 
-std::vector<float> photons_at(const ConeBeam& beam, std::span<const float> attenuation, const Exposure& exposure,
-                              const Intensifier& intensifier) {
+void count_photons(const ConeBeam& beam, const Layers& layers, const Exposure& exposure, const Intensifier& intensifier,
+                   const PixelBox& box, std::span<float> photons) {
   const PixelGrid& grid = beam.detector;
-  OSTEON_CHECK(attenuation.size() == grid.count());
+  OSTEON_CHECK(photons.size() == grid.count() && grid.holds(box) && layers.bone.size() == grid.count());
+  OSTEON_CHECK(layers.metal.empty() || layers.metal.size() == grid.count());
   OSTEON_CHECK(check(exposure).has_value() && check(intensifier).has_value());
   const Vec3 cross = grid.column_mm.cross(grid.row_mm), normal = cross.normalized();
   const double at_metre = kPhotonsPerMm2PerUgy * exposure.air_kerma_at_metre_ugy * cross.norm() * intensifier.detected;
-  std::vector<float> photons(attenuation.size());
-  for (int row = 0; row < grid.rows; ++row)
-    for (int column = 0; column < grid.columns; ++column) {
+  for (int row = box.first_row; row <= box.last_row; ++row)
+    for (int column = box.first_column; column <= box.last_column; ++column) {
       const Vec3 ray = grid.at(column, row) - beam.source_mm;
       const double square = ray.squaredNorm(), cosine = std::abs(normal.dot(ray)) / std::sqrt(square);
       const std::size_t i = grid.index(column, row);
+      const double metal = layers.metal.empty() ? 0.0 : static_cast<double>(layers.metal[i]);
       photons[i] = static_cast<float>(at_metre * kMetre_mm * kMetre_mm / square * cosine *
-                                      std::exp(-static_cast<double>(attenuation[i])));
+                                      std::exp(-(static_cast<double>(layers.bone[i]) + metal)));
     }
-  return photons;
 }
 
-void add_quantum_noise(std::span<float> photons, std::uint64_t seed) {
-  for (std::size_t i = 0; i < photons.size(); ++i) {
-    PixelRandom random(seed, i);
-    photons[i] = static_cast<float>(poisson(static_cast<double>(photons[i]), random));
-  }
+void add_quantum_noise(const PixelGrid& detector, const PixelBox& box, std::uint64_t seed, std::span<float> photons) {
+  OSTEON_CHECK(photons.size() == detector.count() && detector.holds(box));
+  for (int row = box.first_row; row <= box.last_row; ++row)
+    for (int column = box.first_column; column <= box.last_column; ++column) {
+      const std::size_t i = detector.index(column, row);
+      PixelRandom random(seed, i);
+      photons[i] = static_cast<float>(poisson(static_cast<double>(photons[i]), random));
+    }
 }
 
 void add_glare(const PixelGrid& detector, const Intensifier& intensifier, std::span<float> photons) {

@@ -30,14 +30,20 @@ struct Intensifier {
 };
 [[nodiscard]] Result<void> check(const Intensifier& intensifier);
 
-// Mean number of photons that each pixel counts: the kerma without a patient at the pixel, by the inverse square of the
-// distance and the cosine of incidence, times exp(−attenuation).
-[[nodiscard]] std::vector<float> photons_at(const ConeBeam& beam, std::span<const float> attenuation,
-                                            const Exposure& exposure, const Intensifier& intensifier);
-// Replaces each mean by a number of photons at random (Poisson). Equal seeds give equal noise, and the noise of a pixel
-// does not depend on the other pixels.
-void add_quantum_noise(std::span<float> photons, std::uint64_t seed);
+// What weakens the rays, ∫ μ dl of each pixel: the radiograph's layer, and that of cast_metal(), or none.
+struct Layers {
+  std::span<const float> bone, metal = {};
+};
+// Sets the pixels of a box to the mean number of photons that each counts: the kerma without a patient at the pixel, by
+// the inverse square of the distance and the cosine of incidence, times exp(−∫ μ dl).
+void count_photons(const ConeBeam& beam, const Layers& layers, const Exposure& exposure, const Intensifier& intensifier,
+                   const PixelBox& box, std::span<float> photons);
+// Replaces the means in a box by numbers of photons at random (Poisson). The noise of a pixel follows from the seed,
+// its mean and its place in the image alone. So after a change, the boxes that count_photons() set again get the noise
+// that the whole image would have.
+void add_quantum_noise(const PixelGrid& detector, const PixelBox& box, std::uint64_t seed, std::span<float> photons);
 // Spreads a part of the light: veiling glare. The sum of all pixels stays, but for what leaves the image.
+// Light spreads far, so this step takes the whole image, on a copy of the photons, as those after it do.
 void add_glare(const PixelGrid& detector, const Intensifier& intensifier, std::span<float> photons);
 
 // Photons that become black and white. Between them, grey follows the logarithm, so that equal thicknesses differ

@@ -206,9 +206,7 @@ Radiograph::Radiograph(const ConeBeam& beam) : beam_(beam) {
   attenuation_.resize(beam.detector.count());
 }
 
-void Radiograph::cast(const BoneHu& bone) {
-  cast_box(bone, {0, 0, beam_.detector.columns - 1, beam_.detector.rows - 1});
-}
+void Radiograph::cast(const BoneHu& bone) { cast_box(bone, beam_.detector.whole()); }
 
 std::vector<PixelBox> Radiograph::recast(const BoneHu& bone, std::span<const CoordBox> changed) {
   std::vector<PixelBox> boxes;

@@ -23,6 +23,18 @@ ConeBeam coarse_beam() {
   return good_beam(arm);
 }
 
+std::vector<float> photons_behind(const ConeBeam& beam, const Layers& layers) {
+  std::vector<float> photons(beam.detector.count());
+  count_photons(beam, layers, {}, {}, beam.detector.whole(), photons);
+  return photons;
+}
+
+// An image of one row.
+void add_noise(std::vector<float>& photons, std::uint64_t seed) {
+  const PixelGrid row{.columns = static_cast<int>(photons.size()), .rows = 1};
+  add_quantum_noise(row, row.whole(), seed, photons);
+}
+
 double mean_of(std::span<const float> values) {
   return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
 }
@@ -48,16 +60,16 @@ TEST(Metal, LengthsAreThoseOfTheSolid) {
 
 TEST(Metal, DarkensOnlyItsShadow) {
   const ConeBeam beam = coarse_beam();
-  std::vector<float> attenuation(beam.detector.count(), 1.0f);
+  std::vector<float> metal(beam.detector.count(), 7.0f);  // of an image before
   const MetalSolid nail{ball(Vec3(0, 0, 0), 6.0), kSteel_per_mm};
-  add_metal(beam, {&nail, 1}, attenuation);
+  cast_metal(beam, {&nail, 1}, beam.detector.whole(), metal);
   double most = 0.0;
   for (int row = 0; row < 90; ++row)
     for (int column = 0; column < 120; ++column) {
       const Vec3 pixel = beam.detector.at(column, row), d = (pixel - beam.source_mm).normalized();
       const double nearest = (-beam.source_mm - d * d.dot(-beam.source_mm)).norm();
       const double length = nearest < 6.0 ? 2.0 * std::sqrt(36.0 - nearest * nearest) : 0.0;
-      const double found = static_cast<double>(attenuation[beam.detector.index(column, row)]) - 1.0;
+      const double found = static_cast<double>(metal[beam.detector.index(column, row)]);
       ASSERT_NEAR(found, kSteel_per_mm * length, 3.0 * kMetalStep_mm * kSteel_per_mm);
       most = std::max(most, found);
     }
@@ -67,8 +79,9 @@ TEST(Metal, DarkensOnlyItsShadow) {
 TEST(Intensifier, PhotonsFollowTheLawOfBeerAndLambert) {
   const ConeBeam beam = coarse_beam();
   const std::vector<float> none(beam.detector.count(), 0.0f), one(beam.detector.count(), 1.0f);
-  const std::vector<float> open = photons_at(beam, none, {}, {}), dimmed = photons_at(beam, one, {}, {});
+  const std::vector<float> open = photons_behind(beam, {none}), dimmed = photons_behind(beam, {one});
   for (std::size_t i = 0; i < open.size(); ++i) ASSERT_NEAR(dimmed[i] / open[i], std::exp(-1.0f), 1e-6f);
+  EXPECT_EQ(photons_behind(beam, {none, one}), dimmed);  // metal as bone
   // At twice the distance, a quarter of the photons.
   CArm far;
   far.detector_mm = 120.0;
@@ -76,7 +89,7 @@ TEST(Intensifier, PhotonsFollowTheLawOfBeerAndLambert) {
   far.rows = 90;
   far.source_detector_mm = 2000.0;
   const float middle = open[beam.detector.index(60, 45)];
-  EXPECT_NEAR(photons_at(good_beam(far), none, {}, {})[beam.detector.index(60, 45)] / middle, 0.25f, 1e-3f);
+  EXPECT_NEAR(photons_behind(good_beam(far), {none})[beam.detector.index(60, 45)] / middle, 0.25f, 1e-3f);
 }
 
 TEST(Intensifier, DoseAreaDoesNotDependOnTheDistance) {
@@ -96,7 +109,7 @@ TEST(Intensifier, NoiseIsPoisson) {
   constexpr std::size_t kPixels = 40000;
   for (const double mean : {0.3, 4.0, 59.0, 61.0, 5000.0}) {
     std::vector<float> photons(kPixels, static_cast<float>(mean));
-    add_quantum_noise(photons, 1234);
+    add_noise(photons, 1234);
     double squares = 0.0;
     const double found = mean_of(photons);
     for (const float n : photons) squares += (static_cast<double>(n) - found) * (static_cast<double>(n) - found);
@@ -107,10 +120,10 @@ TEST(Intensifier, NoiseIsPoisson) {
 
 TEST(Intensifier, NoiseRepeatsWithItsSeed) {
   std::vector<float> a(500, 80.0f), b(500, 80.0f), other(500, 80.0f), longer(700, 80.0f);
-  add_quantum_noise(a, 1);
-  add_quantum_noise(b, 1);
-  add_quantum_noise(other, 2);
-  add_quantum_noise(longer, 1);
+  add_noise(a, 1);
+  add_noise(b, 1);
+  add_noise(other, 2);
+  add_noise(longer, 1);
   EXPECT_EQ(a, b);
   EXPECT_NE(a, other);
   EXPECT_TRUE(std::equal(a.begin(), a.end(), longer.begin()));

@@ -12,8 +12,11 @@
 #include <numbers>
 
 #include "common/radiology/attenuation.hpp"
+#include "common/radiology/intensifier.hpp"
+#include "common/radiology/metal.hpp"
 #include "common/radiology/sampling.hpp"
 #include "common/tools/implicit.hpp"
+#include "common/tools/tool_solid.hpp"
 #include "common/volume/fragments.hpp"
 #include "tests/support/scenes/random_cuts.hpp"
 #include "tests/unit/radiology/beams.hpp"
@@ -329,6 +332,64 @@ TEST(Radiograph, ASawnPieceStaysUntilItIsTakenAway) {
   // The piece is all right of the slot: some 2.5 x 16 x 8 mm.
   EXPECT_NEAR(block.piece_mm3, 320.0, 40.0);
   EXPECT_NEAR(sawn - follow(), per_mm * block.piece_mm3, 0.03 * per_mm * block.piece_mm3);
+}
+
+// All that a viewer keeps from one change to the next, and what it shows.
+struct Picture {
+  Radiograph bone;
+  std::vector<float> metal, photons;  // photons with their noise
+  explicit Picture(const ConeBeam& beam) : bone(beam), metal(beam.detector.count()), photons(beam.detector.count()) {}
+
+  void renew(std::span<const MetalSolid> solids, const PixelBox& box) {
+    cast_metal(bone.beam(), solids, box, metal);
+    count_photons(bone.beam(), {bone.attenuation(), metal}, {}, {}, box, photons);
+    add_quantum_noise(bone.beam().detector, box, 99, photons);
+  }
+  [[nodiscard]] std::vector<std::uint8_t> shown() const {
+    std::vector<float> light = photons;
+    add_glare(bone.beam().detector, {}, light);
+    return grey_of(light, automatic_contrast(light));
+  }
+};
+
+// A drill that goes on cutting: only its shadows, before and after, and the rays through what it cut are new.
+TEST(Radiograph, APictureOfWhatChangedIsTheWholePicture) {
+  CutField field(test::ball_of_bone(), {});
+  BoneHu bone = hu_of(field.bone());
+  const ConeBeam beam = small_beam(0.5, -0.4);
+  const Tool tool = *find_tool("drill-3.2");
+  const auto solids_at = [](double z) {
+    return std::vector<MetalSolid>{
+        {placed(cylinder(1.6, 0.0, 15.0), pose_along(Vec3(1, 0, z), Vec3(0, 0, 1))), kSteel_per_mm},
+        {ball(Vec3(-9, 3, 0), 1.5), kTitanium_per_mm}};
+  };
+  Picture again(beam);
+  again.bone.cast(bone);
+  again.renew(solids_at(12.0), beam.detector.whole());
+  const std::vector<float> first = again.photons;
+  std::size_t renewed = 0;
+  for (int step = 0; step < 12; ++step) {
+    const double from = 12.0 - step, to = from - 1.0;
+    const CutReport report = field.apply(test::straight_cut(tool, {1, 0, from}, {1, 0, to}, {0, 0, -1}));
+    std::vector<PixelBox> boxes =
+        again.bone.recast(bone, bone.update(std::vector<const CutField*>{&field},
+                                            std::vector{ChangedLeaves{report.level, report.changed_leaves}}));
+    for (const double z : {from, to}) boxes.push_back(shadow_of(solids_at(z).front().solid.bounds, beam));
+    const std::vector<MetalSolid> solids = solids_at(to);
+    for (const PixelBox& box : boxes) {
+      again.renew(solids, box);
+      renewed += to_index((box.last_column - box.first_column + 1) * (box.last_row - box.first_row + 1));
+    }
+    Picture whole(beam);
+    whole.bone.cast(bone);
+    whole.renew(solids, beam.detector.whole());
+    ASSERT_TRUE(std::ranges::equal(again.bone.attenuation(), whole.bone.attenuation()));
+    ASSERT_EQ(again.metal, whole.metal);
+    ASSERT_EQ(again.photons, whole.photons);
+    ASSERT_EQ(again.shown(), whole.shown());
+  }
+  EXPECT_NE(again.photons, first);
+  EXPECT_LT(renewed, 12 * beam.detector.count());  // less than all pixels each time
 }
 
 // The same with a beam in which the rays have different dominant axes.
