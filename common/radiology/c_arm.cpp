@@ -70,6 +70,7 @@ CArm c_arm_at(View view, const Vec3& isocentre_mm) {
 
 Result<ConeBeam> beam_of(const CArm& arm) {
   if (auto good = check(arm); !good) return tl::unexpected(std::move(good).error());
+  // The tilt acts first, in the arm's own plane; the orbit turns that plane.
   const Eigen::Matrix3d turn =
       (Eigen::AngleAxisd(arm.orbit_rad, Vec3::UnitZ()) * Eigen::AngleAxisd(-arm.tilt_rad, Vec3::UnitX()))
           .toRotationMatrix();

@@ -21,10 +21,12 @@ struct ConeBeam {
 // [A] Dimensions of a usual mobile C-arm with a detector of 30 cm.
 struct CArm {
   Vec3 isocentre_mm = Vec3::Zero();  // what both rotations are about, in the bone's frame (LPS)
-  // About the patient's long axis. At 0 the tube is under the table, behind the patient, and the detector in front of
-  // the patient. Positive angles move the detector to the patient's left.
-  double orbit_rad = 0.0;
-  double tilt_rad = 0.0;  // moves the detector towards the head
+  // Both as DICOM has them for a positioner (PS3.3 C.8.7.5), but in radians. The detector lies in the direction
+  // (sin orbit · cos tilt, −cos orbit · cos tilt, sin tilt) from the isocentre. So the orbit is about the patient's
+  // long axis, and the tilt about an axis that the orbit has turned. At 0 the tube is under the table, behind the
+  // patient, and the detector in front of the patient.
+  double orbit_rad = 0.0;  // Positioner Primary Angle: moves the detector to the patient's left (LAO is positive)
+  double tilt_rad = 0.0;   // Positioner Secondary Angle: moves the detector towards the head (CRA is positive)
   Vec3 translation_mm = Vec3::Zero();
   double source_detector_mm = 1000.0;
   double source_isocentre_mm = 600.0;

@@ -5,6 +5,7 @@
 
 #include <functional>
 #include <limits>
+#include <numbers>
 #include <string>
 
 #include "tests/support/scenes/random.hpp"
@@ -47,6 +48,22 @@ TEST(CArm, OrbitMovesTheDetectorToTheLeftAndTiltToTheHead) {
   const ConeBeam there = good_beam(arm);
   arm.translation_mm = Vec3(3, 4, 5);
   EXPECT_LT((good_beam(arm).source_mm - there.source_mm - Vec3(3, 4, 5)).norm(), 1e-9);
+}
+
+// By hand: an orbit of 30° and a tilt of 45°, from the isocentre, as DICOM's primary and secondary angles. With the
+// rotations in the other order, the detector would lie at (0.5, −0.6124, 0.6124).
+TEST(CArm, OrbitAndTiltAreThePrimaryAndTheSecondaryAngle) {
+  CArm arm;
+  arm.orbit_rad = std::numbers::pi / 6.0;
+  arm.tilt_rad = std::numbers::pi / 4.0;
+  const ConeBeam beam = good_beam(arm);
+  const Vec3 to_detector(0.5 * 0.70710678, -0.86602540 * 0.70710678, 0.70710678);
+  EXPECT_LT((beam_direction(beam) - to_detector).norm(), 1e-7);
+  EXPECT_LT((beam.source_mm + 600.0 * to_detector).norm(), 1e-4);
+  // The rows of the image stay across the patient's long axis: the orbit alone turns them.
+  EXPECT_LT((beam.detector.column_mm.normalized() - Vec3(0.86602540, 0.5, 0.0)).norm(), 1e-7);
+  EXPECT_LT((beam.detector.row_mm.normalized() - Vec3(0.5 * 0.70710678, -0.86602540 * 0.70710678, -0.70710678)).norm(),
+            1e-7);
 }
 
 // Intercept theorem: 30 mm at the isocentre are 50 mm on the detector.
