@@ -9,6 +9,7 @@
 #include <numbers>
 
 #include "tests/support/scenes/random_cuts.hpp"
+#include "tests/unit/radiology/reference_hu.hpp"
 
 namespace osteon::radiology {
 namespace {
@@ -201,6 +202,65 @@ TEST(BoneHu, LosesTheVolumeThatWasRemoved) {
   const double removed_mm3 = (before - whole()) / attenuation_per_mm((1.9 - 0.131) / 0.001067);
   EXPECT_GT(removed_mm3, 50.0);
   EXPECT_NEAR(removed_mm3, field.removed_mm3(), 0.01 * field.removed_mm3());
+}
+
+// Of every sample: those that a cut changed against the definition, all others as before. Half a step of rounding, and
+// what 32 bits lose in a fraction of a thin part.
+void expect_reference(const Case& bone, const Cut& cut, std::size_t least_partly_cut) {
+  auto hu = BoneHu::make(bone);
+  ASSERT_TRUE(hu.has_value());
+  std::vector<double> before;
+  each_sample(hu->box(), [&](Coord c) { before.push_back(hu->attenuation_per_mm(c)); });
+  CutField field(bone, {});
+  hu->update(only(field), std::vector{changes_of(field.apply(cut))});
+  std::size_t i = 0, partly = 0;
+  each_sample(hu->box(), [&](Coord c) {
+    const double was = before[i++], now = hu->attenuation_per_mm(c);
+    if (now == was) return;
+    EXPECT_NEAR(now, reference_per_mm(field, c), 5e-5) << c.x << ' ' << c.y << ' ' << c.z;
+    partly += now > 0.1 * was && now < 0.9 * was ? 1 : 0;
+  });
+  EXPECT_GT(partly, least_partly_cut);
+  // Nothing that should have changed was left as it was.
+  for (std::int32_t x = -8; x <= 8; ++x)
+    for (std::int32_t z = -8; z <= 2; ++z) {
+      const Coord c{x, 0, z};
+      ASSERT_NEAR(hu->attenuation_per_mm(c), reference_per_mm(field, c), 5e-5);
+    }
+}
+
+TEST(BoneHu, APartlyCutSampleKeepsItsPartOfF) { expect_reference(test::plain_block(16.0, 12.0, 0.5), hole(), 100); }
+
+// A case so fine that its own samples are the finest.
+TEST(BoneHu, CutsOfLevelZeroAreSeen) {
+  const Case bone = test::plain_block(3.0, 2.0, 0.15);
+  ASSERT_EQ(finest_level(bone.pitch_mm()), 0);
+  Cut cut = test::straight_cut(*find_tool("burr-round-5"), {0, 0, 1}, {0.05, 0, -0.5}, {0, 0, -1});
+  cut.level = 0;
+  expect_reference(bone, cut, 50);
+}
+
+TEST(BoneHu, AnUpdateEqualsARenewalInAScan) {
+  ScannedBlock scene;
+  auto updated = BoneHu::make(scene.bone, &scene.scan), renewed = BoneHu::make(scene.bone, &scene.scan);
+  ASSERT_TRUE(updated.has_value() && renewed.has_value());
+  const std::vector<float> uncut = all_hu(*updated);
+  CutField field(scene.bone, {});
+  for (int step = 0; step < 6; ++step) {
+    const Cut cut = test::straight_cut(*find_tool("burr-round-5"), {-3.0 + step, 0.3 * step, -1.0},
+                                       {-2.0 + step, 0.3 * step, -1.5}, {0, 0, -1});
+    updated->update(only(field), std::vector{changes_of(field.apply(cut))});
+    renewed->renew(only(field));
+    ASSERT_EQ(all_hu(*updated), all_hu(*renewed));
+  }
+  EXPECT_NE(all_hu(*updated), uncut);
+  std::vector<ChangedLeaves> undone;
+  for (const FieldLeaf& leaf : field.leaf_places()) {
+    field.reset(leaf.level, leaf.origin);
+    undone.push_back({leaf.level, {leaf.origin}});
+  }
+  updated->update(only(field), undone);
+  EXPECT_EQ(all_hu(*updated), uncut);
 }
 
 TEST(BoneHu, AnUpdateEqualsARenewal) {
