@@ -93,6 +93,16 @@ Result<void> check(const Contrast& contrast) {
   return {};
 }
 
+Result<void> check(const ExposureControl& control) {
+  if (!(control.photons_per_mm2 > 0.0 && control.photons_per_mm2 <= static_cast<double>(kMostPhotons)))
+    return bad_field("the exposure control's photons_per_mm2", "must be above 0 and at most 1e30");
+  if (!(control.least_kerma_ugy >= 0.0 && control.least_kerma_ugy <= kMostKerma_ugy))
+    return bad_field("the exposure control's least_kerma_ugy", "must be from 0 to 1e9");
+  if (!(control.most_kerma_ugy >= control.least_kerma_ugy && control.most_kerma_ugy <= kMostKerma_ugy))
+    return bad_field("the exposure control's most_kerma_ugy", "must be from its least_kerma_ugy to 1e9");
+  return {};
+}
+
 double dose_area_gy_cm2(const ConeBeam& beam, const Exposure& exposure) {
   OSTEON_CHECK(check(exposure).has_value());
   const PixelGrid& grid = beam.detector;
@@ -122,6 +132,25 @@ void count_photons(const ConeBeam& beam, const Layers& layers, const Exposure& e
     }
 }
 
+Exposure controlled_exposure(const ConeBeam& beam, const Layers& layers, const Intensifier& intensifier,
+                             const ExposureControl& control) {
+  OSTEON_CHECK(check(control).has_value());
+  const PixelGrid& grid = beam.detector;
+  const PixelBox middle{grid.columns / 4, grid.rows / 4, grid.columns - 1 - grid.columns / 4,
+                        grid.rows - 1 - grid.rows / 4};
+  // Photons are in proportion to kerma, so those of 1 µGy tell what is needed.
+  std::vector<float> photons(grid.count());
+  count_photons(beam, layers, {.air_kerma_at_metre_ugy = 1.0}, intensifier, middle, photons);
+  double sum = 0.0, pixels = 0.0;
+  for (int row = middle.first_row; row <= middle.last_row; ++row)
+    for (int column = middle.first_column; column <= middle.last_column; ++column, pixels += 1.0)
+      sum += static_cast<double>(photons[grid.index(column, row)]);
+  const double needed = control.photons_per_mm2 * grid.column_mm.cross(grid.row_mm).norm() * pixels;
+  // Behind metal that lets no photon through, the tube does what it can.
+  const double kerma_ugy = sum * control.most_kerma_ugy > needed ? needed / sum : control.most_kerma_ugy;
+  return {std::max(kerma_ugy, control.least_kerma_ugy)};
+}
+
 void add_quantum_noise(const PixelGrid& detector, const PixelBox& box, std::uint64_t seed, std::span<float> photons) {
   OSTEON_CHECK(photons.size() == detector.count() && detector.holds(box));
   for (int row = box.first_row; row <= box.last_row; ++row)
@@ -149,7 +178,7 @@ void add_glare(const PixelGrid& detector, const Intensifier& intensifier, std::s
   for (std::size_t i = 0; i < photons.size(); ++i) photons[i] += part * (veil[i] - photons[i]);
 }
 
-Contrast automatic_contrast(std::span<const float> photons) {
+Contrast automatic_window(std::span<const float> photons) {
   OSTEON_CHECK(!photons.empty());
   std::vector<float> sorted(photons.begin(), photons.end());
   const std::size_t hundredth = sorted.size() / 100;

@@ -38,6 +38,16 @@ struct Layers {
 // the inverse square of the distance and the cosine of incidence, times exp(−∫ μ dl).
 void count_photons(const ConeBeam& beam, const Layers& layers, const Exposure& exposure, const Intensifier& intensifier,
                    const PixelBox& box, std::span<float> photons);
+// [A] Automatic brightness control: the pulse is as strong as the body in the middle of the image needs. A real C-arm
+// raises the tube's voltage too, so the rays become harder. Here the energy stays, and only the kerma follows. So dose
+// rises faster with thickness than that of a C-arm.
+struct ExposureControl {
+  double photons_per_mm2 = 600.0;  // that count, as a mean over the middle half of columns and rows of the detector
+  double least_kerma_ugy = 0.1, most_kerma_ugy = 20.0;  // at 1 m: what the tube can do
+};
+[[nodiscard]] Result<void> check(const ExposureControl& control);
+[[nodiscard]] Exposure controlled_exposure(const ConeBeam& beam, const Layers& layers, const Intensifier& intensifier,
+                                           const ExposureControl& control);
 // Replaces the means in a box by numbers of photons at random (Poisson). The noise of a pixel follows from the seed,
 // its mean and its place in the image alone. So after a change, the boxes that count_photons() set again get the noise
 // that the whole image would have.
@@ -54,8 +64,9 @@ struct Contrast {
 };
 // White must be a hundredth above black, at least.
 [[nodiscard]] Result<void> check(const Contrast& contrast);
-// As automatic brightness control sets it: the darkest and the brightest hundredth of the image are black and white.
-[[nodiscard]] Contrast automatic_contrast(std::span<const float> photons);
+// An automatic window: the darkest and the brightest hundredth of the image are black and white. It changes what is
+// shown and no dose; controlled_exposure() does that.
+[[nodiscard]] Contrast automatic_window(std::span<const float> photons);
 [[nodiscard]] std::vector<std::uint8_t> grey_of(std::span<const float> photons, const Contrast& contrast);
 
 }  // namespace osteon::radiology

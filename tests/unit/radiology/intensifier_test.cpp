@@ -35,6 +35,14 @@ void add_noise(std::vector<float>& photons, std::uint64_t seed) {
   add_quantum_noise(row, row.whole(), seed, photons);
 }
 
+template <class Settings>
+void expect_refused(const Settings& settings, const char* field) {
+  const Result<void> good = check(settings);
+  ASSERT_FALSE(good.has_value()) << field;
+  EXPECT_EQ(good.error().code, ErrorCode::invalid_input);
+  EXPECT_NE(good.error().message.find(field), std::string::npos) << good.error().message;
+}
+
 double mean_of(std::span<const float> values) {
   return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
 }
@@ -120,6 +128,34 @@ TEST(Intensifier, DoseAreaDoesNotDependOnTheDistance) {
   EXPECT_NEAR(dose_area_gy_cm2(good_beam(arm), {2.0}), 2e-4, 1e-12);
 }
 
+// Behind more matter the pulse is stronger by what the matter takes, as is its dose-area product, and the image has the
+// same photons. Beyond its limits the tube does what it can.
+TEST(Intensifier, ExposureFollowsTheThickness) {
+  const ConeBeam beam = coarse_beam();
+  const auto behind = [&](float attenuation) { return std::vector<float>(beam.detector.count(), attenuation); };
+  const auto exposure = [&](float attenuation) {
+    return controlled_exposure(beam, {behind(attenuation)}, {}, ExposureControl{});
+  };
+  const auto middle_photons = [&](float attenuation) {
+    std::vector<float> photons(beam.detector.count());
+    const std::vector<float> layer = behind(attenuation);
+    count_photons(beam, {layer}, exposure(attenuation), {}, beam.detector.whole(), photons);
+    double sum = 0.0;
+    for (int row = 22; row < 68; ++row)
+      for (int column = 30; column < 90; ++column)
+        sum += static_cast<double>(photons[beam.detector.index(column, row)]);
+    return sum / (46.0 * 60.0);  // pixels of 1 mm²
+  };
+  EXPECT_NEAR(middle_photons(3.5f), 600.0, 0.1);
+  EXPECT_NEAR(middle_photons(4.5f), 600.0, 0.1);
+  EXPECT_NEAR(dose_area_gy_cm2(beam, exposure(4.5f)) / dose_area_gy_cm2(beam, exposure(3.5f)), std::exp(1.0), 1e-4);
+  EXPECT_EQ(exposure(200.0f).air_kerma_at_metre_ugy, 20.0);
+  EXPECT_EQ(exposure(0.0f).air_kerma_at_metre_ugy, 0.1);
+  expect_refused(ExposureControl{.photons_per_mm2 = 0.0}, "photons_per_mm2");
+  expect_refused(ExposureControl{.least_kerma_ugy = -1.0}, "least_kerma_ugy");
+  expect_refused(ExposureControl{.most_kerma_ugy = 0.05}, "most_kerma_ugy");
+}
+
 // Mean and variance of a Poisson distribution are equal. Bounds: four standard errors.
 TEST(Intensifier, NoiseIsPoisson) {
   constexpr std::size_t kPixels = 40000;
@@ -162,20 +198,11 @@ TEST(Intensifier, GreyFollowsTheLogarithm) {
   EXPECT_EQ(grey_of(photons, {10.0f, 10000.0f, true}), (std::vector<std::uint8_t>{255, 255, 170, 85, 0, 0}));
   std::vector<float> ramp(1000);
   std::iota(ramp.begin(), ramp.end(), 1.0f);
-  const Contrast contrast = automatic_contrast(ramp);
+  const Contrast contrast = automatic_window(ramp);
   EXPECT_EQ(contrast.black, 11.0f);
   EXPECT_EQ(contrast.white, 990.0f);
   // An image of one value, such as air.
-  EXPECT_GT(automatic_contrast(std::vector<float>(9, 5.0f)).white,
-            automatic_contrast(std::vector<float>(9, 5.0f)).black);
-}
-
-template <class Settings>
-void expect_refused(const Settings& settings, const char* field) {
-  const Result<void> good = check(settings);
-  ASSERT_FALSE(good.has_value()) << field;
-  EXPECT_EQ(good.error().code, ErrorCode::invalid_input);
-  EXPECT_NE(good.error().message.find(field), std::string::npos) << good.error().message;
+  EXPECT_GT(automatic_window(std::vector<float>(9, 5.0f)).white, automatic_window(std::vector<float>(9, 5.0f)).black);
 }
 
 TEST(Intensifier, RefusesSettingsAndNamesTheField) {

@@ -478,7 +478,7 @@ struct Picture {
   [[nodiscard]] std::vector<std::uint8_t> shown() const {
     std::vector<float> light = photons;
     add_glare(bone.beam().detector, {}, light);
-    return grey_of(light, automatic_contrast(light));
+    return grey_of(light, automatic_window(light));
   }
 };
 
