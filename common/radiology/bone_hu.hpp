@@ -12,8 +12,9 @@
 
 namespace osteon::radiology {
 
-// Density without a line of its own, as of a phantom or a mesh, becomes HU by this one (Rho 1995).
-inline constexpr DensityCalibration kDefaultLine{.slope_g_cm3_per_hu = 0.001067, .intercept_g_cm3 = 0.131};
+// [A] Density without a line of its own, as of a mesh, becomes HU by this one. It is an extrapolation in cortex: bone
+// of 1.92 g/cm³ has 1677 HU by it, and 1593.5 by its coefficients (attenuation.hpp). So cortex is 4 % too dark.
+inline constexpr DensityCalibration kDefaultLine = kRho1995;
 
 // What sampling reads: attenuation in steps (attenuation.hpp), z fastest. All outer samples are air, and one more value
 // follows the last. A brick is a cube of 8 cells, so its samples are 9³; bricks share the samples of their faces.

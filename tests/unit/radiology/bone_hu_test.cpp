@@ -124,6 +124,15 @@ TEST(BoneHu, NoHuOfAScanIsTooHigh) {
   EXPECT_NEAR(static_cast<double>(hu->hu({0, 0, -4})), 32767.0, 1.0);
 }
 
+// The line of a case without its own is that of the import, and is off by no more than its comment says.
+TEST(BoneHu, TheDefaultLineIsNearTheCoefficientsOfCorticalBone) {
+  EXPECT_EQ(kDefaultLine, kRho1995);
+  const auto bone = BoneHu::make(test::plain_block(8.0, 6.0, 0.5, 1.92));
+  ASSERT_TRUE(bone.has_value());
+  EXPECT_NEAR(static_cast<double>(bone->hu({0, 0, -6})), 1677.0, 1.0);
+  EXPECT_NEAR(bone->attenuation_per_mm({0, 0, -6}) / kCorticalBone_per_mm, 1.038, 0.002);
+}
+
 // The attenuation of a whole ball converges to that of its volume, because its skin is partly bone.
 TEST(BoneHu, HoldsTheMassOfABall) {
   const auto mass = [](double pitch) {
