@@ -47,6 +47,28 @@ void each_part(const CoordBox& box, std::int32_t side, Call call) {
         call(intersection(box, {{x, y, z}, {x + side - 1, y + side - 1, z + side - 1}}));
 }
 
+std::size_t parts_in(const CoordBox& box, std::int32_t side) {
+  std::size_t parts = 0;
+  each_part(box, side, [&](const CoordBox&) { ++parts; });
+  return parts;
+}
+
+// Asks after each of some equal parts of long work whether to go on.
+class Parts {
+ public:
+  Parts(const KeepGoing& keep_going, std::size_t count) : keep_going_(keep_going), count_(static_cast<double>(count)) {}
+  void next() {
+    done_ += 1.0;
+    if (!stopped_ && keep_going_) stopped_ = !keep_going_(done_ / count_);
+  }
+  [[nodiscard]] bool stopped() const { return stopped_; }
+
+ private:
+  const KeepGoing& keep_going_;
+  double count_, done_ = 0.0;
+  bool stopped_ = false;
+};
+
 Box box_of_scan(const ScanGeometry& geometry) {
   Box box;
   for (int corner = 0; corner < 8; ++corner)
@@ -144,7 +166,7 @@ BoneHu::BoneHu(Case bone, const CoordBox& box)
   occupied_.assign(to_index(bricks_.x) * to_index(bricks_.y) * to_index(bricks_.z), 0);
 }
 
-Result<BoneHu> BoneHu::make(const Case& bone, const CaseScan* scan) {
+Result<BoneHu> BoneHu::make(const Case& bone, const CaseScan* scan, const KeepGoing& keep_going) {
   CoordBox box = bone.bounds_samples();
   if (scan) {
     const ScanGeometry& geometry = scan->geometry;
@@ -158,23 +180,23 @@ Result<BoneHu> BoneHu::make(const Case& bone, const CaseScan* scan) {
                    "the bone has too many samples for slices and radiographs; import it with a "
                    "coarser --pitch");
   BoneHu made(bone, box);
-  if (scan)
-    made.fill_from_scan(*scan);
-  else
-    made.fill_from_density();
+  const bool whole = scan ? made.fill_from_scan(*scan, keep_going) : made.fill_from_density(keep_going);
+  if (!whole) return stopped_while("preparing slices and radiographs");
   made.fill_metal();
   made.steps_ = made.uncut_;
   made.note_occupied(box);
   return made;
 }
 
-void BoneHu::fill_from_density() {
+bool BoneHu::fill_from_density(const KeepGoing& keep_going) {
   const DensityCalibration given = bone_.info().calibration;
   const DensityCalibration line = given.slope_g_cm3_per_hu > 0.0 ? given : kDefaultLine;
   const auto slope = static_cast<float>(line.slope_g_cm3_per_hu);
   const auto intercept = static_cast<float>(line.intercept_g_cm3), pitch = static_cast<float>(pitch_mm());
   std::vector<float> surface, density;
+  Parts parts(keep_going, parts_in(box_, 4 * kPartSide));
   each_part(box_, 4 * kPartSide, [&](const CoordBox& part) {
+    if (parts.stopped()) return;
     surface.resize(samples_in(part));
     density.resize(samples_in(part));
     bone_.gather_surface(part, surface);
@@ -187,13 +209,16 @@ void BoneHu::fill_from_density() {
           *to = rounded_steps(static_cast<double>(solid_part(surface[i], pitch)) *
                               radiology::attenuation_per_mm(static_cast<double>((density[i] - intercept) / slope)));
       }
+    parts.next();
   });
+  return !parts.stopped();
 }
 
-void BoneHu::fill_from_scan(const CaseScan& scan) {
+bool BoneHu::fill_from_scan(const CaseScan& scan, const KeepGoing& keep_going) {
   from_scan_ = true;
   const Eigen::Matrix3d to_voxels = scan.geometry.axes_mm.inverse();
-  for (std::int32_t x = box_.min.x; x <= box_.max.x; ++x)
+  Parts planes(keep_going, to_index(box_.dims().x));
+  for (std::int32_t x = box_.min.x; x <= box_.max.x && !planes.stopped(); ++x) {
     for (std::int32_t y = box_.min.y; y <= box_.max.y; ++y) {
       std::uint16_t* to = uncut_.data() + index({x, y, box_.min.z});
       for (std::int32_t z = box_.min.z; z <= box_.max.z; ++z, ++to) {
@@ -201,6 +226,9 @@ void BoneHu::fill_from_scan(const CaseScan& scan) {
         *to = rounded_steps(radiology::attenuation_per_mm(static_cast<double>(scan_hu(scan, voxel))));
       }
     }
+    planes.next();
+  }
+  return !planes.stopped();
 }
 
 // Neither density, which ends at compact bone, nor the HU of most scanners tell how dense metal is. Only samples within
@@ -329,10 +357,17 @@ CoordBox BoneHu::renew_box(std::span<const CutField* const> bodies, const CoordB
   return changed;
 }
 
-void BoneHu::renew(std::span<const CutField* const> bodies) {
+Result<void> BoneHu::renew(std::span<const CutField* const> bodies, const KeepGoing& keep_going) {
   OSTEON_CHECK(!bodies.empty());
-  each_part(box_, kPartSide, [&](const CoordBox& part) { renew_box(bodies, part); });
+  Parts parts(keep_going, parts_in(box_, kPartSide));
+  each_part(box_, kPartSide, [&](const CoordBox& part) {
+    if (parts.stopped()) return;
+    renew_box(bodies, part);
+    parts.next();
+  });
   note_occupied(box_);
+  if (parts.stopped()) return stopped_while("renewing slices and radiographs");
+  return {};
 }
 
 std::vector<CoordBox> BoneHu::update(std::span<const CutField* const> bodies, std::span<const ChangedLeaves> changes) {

@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include "common/core/keep_going.hpp"
 #include "common/core/result.hpp"
 #include "common/radiology/attenuation.hpp"
 #include "common/volume/case_scan.hpp"
@@ -13,7 +14,8 @@
 namespace osteon::radiology {
 
 // [A] Density without a line of its own, as of a mesh, becomes HU by this one. It is an extrapolation in cortex: bone
-// of 1.92 g/cm³ has 1677 HU by it, and 1593.5 by its coefficients (attenuation.hpp). So cortex is 4 % too dark.
+// of 1.92 g/cm³ has 1677 HU by it, and 1593.5 by its coefficients (attenuation.hpp). So cortex
+// weakens rays 4 % too much.
 inline constexpr DensityCalibration kDefaultLine = kRho1995;
 
 // What sampling reads: attenuation in steps (attenuation.hpp), z fastest. All outer samples are air, and one more value
@@ -31,14 +33,16 @@ class BoneHu {
  public:
   // The bone before any cut. With a scan: its HU, trilinear, air beyond it. Otherwise from the density, and air is
   // where no bone is; a sample within half a pitch of the surface is partly bone. What the case has as metal is metal
-  // in both (kMetal_per_mm). Errors: invalid_input (a scan without
-  // HU), exhausted (more samples than kMostHuSamples).
-  [[nodiscard]] static Result<BoneHu> make(const Case& bone, const CaseScan* scan = nullptr);
+  // in both (kMetal_per_mm). One thread. Errors: invalid_input (a scan without HU), exhausted (more samples than
+  // kMostHuSamples), cancelled.
+  [[nodiscard]] static Result<BoneHu> make(const Case& bone, const CaseScan* scan = nullptr,
+                                           const KeepGoing& keep_going = {});
 
   // Brings all samples up to date. `bodies`: every body of the room, of this case; at least one. A sample keeps the
   // part of its bone that is still in a body: the mean of the solid fraction over its voxel, from the finest level of
   // the case. So a cut changes nothing where no bone was.
-  void renew(std::span<const CutField* const> bodies);
+  // One thread; seconds for the largest bones. Error: cancelled; some samples are then as before, so renew again.
+  [[nodiscard]] Result<void> renew(std::span<const CutField* const> bodies, const KeepGoing& keep_going = {});
   // The same for leaves that changed since. Returns boxes that hold every sample with another value than before.
   // Afterwards all is as after renew().
   std::vector<CoordBox> update(std::span<const CutField* const> bodies, std::span<const ChangedLeaves> changes);
@@ -54,8 +58,8 @@ class BoneHu {
 
  private:
   BoneHu(Case bone, const CoordBox& box);
-  void fill_from_density();
-  void fill_from_scan(const CaseScan& scan);
+  [[nodiscard]] bool fill_from_density(const KeepGoing& keep_going);
+  [[nodiscard]] bool fill_from_scan(const CaseScan& scan, const KeepGoing& keep_going);
   void fill_metal();
   void restore(const CoordBox& box);
   void cut(std::span<const CutField* const> bodies, const CoordBox& box);

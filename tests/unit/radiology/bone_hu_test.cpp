@@ -99,7 +99,7 @@ TEST(BoneHu, MetalOfTheCaseIsNotBone) {
   // What is cut away is gone, metal or not.
   CutField field(bone, {});
   field.apply(hole(10.0));
-  hu->renew(only(field));
+  EXPECT_TRUE(hu->renew(only(field)).has_value());
   EXPECT_EQ(hu->attenuation_per_mm({0, 0, -12}), 0.0);
 }
 
@@ -176,7 +176,7 @@ TEST(BoneHu, CutsReadAirOnlyWhereBoneWas) {
   const std::vector<float> before = all_hu(*hu);
   CutField field(scene.bone, {});
   field.apply(hole());
-  hu->renew(only(field));
+  EXPECT_TRUE(hu->renew(only(field)).has_value());
   std::size_t i = 0, removed = 0, spared = 0;
   each_sample(around(*hu), [&](Coord c) {
     const float was = before[i++], now = hu->hu(c), s = surface_at(scene.bone, c);
@@ -259,7 +259,7 @@ TEST(BoneHu, AnUpdateEqualsARenewalInAScan) {
     const Cut cut = test::straight_cut(*find_tool("burr-round-5"), {-3.0 + step, 0.3 * step, -1.0},
                                        {-2.0 + step, 0.3 * step, -1.5}, {0, 0, -1});
     updated->update(only(field), std::vector{changes_of(field.apply(cut))});
-    renewed->renew(only(field));
+    EXPECT_TRUE(renewed->renew(only(field)).has_value());
     ASSERT_EQ(all_hu(*updated), all_hu(*renewed));
   }
   EXPECT_NE(all_hu(*updated), uncut);
@@ -292,7 +292,7 @@ TEST(BoneHu, AnUpdateEqualsARenewal) {
     });
   }
   EXPECT_GT(changed_cuts, 20U);
-  renewed->renew(only(field));
+  EXPECT_TRUE(renewed->renew(only(field)).has_value());
   EXPECT_EQ(all_hu(*updated), all_hu(*renewed));
   // Everything comes back when all cuts are undone.
   std::vector<ChangedLeaves> undone;
@@ -324,6 +324,41 @@ TEST(BoneHu, KnowsWhichBricksAreEmpty) {
         empty += any ? 0 : 1;
       }
   EXPECT_GT(empty, 0U);
+}
+
+// Progress rises to the whole, and a call that says no ends the work with `cancelled`.
+TEST(BoneHu, TellsItsProgressAndStopsWhenAsked) {
+  ScannedBlock scene;
+  CutField field(scene.bone, {});
+  field.apply(hole());
+  for (const CaseScan* scan : {static_cast<const CaseScan*>(nullptr), static_cast<const CaseScan*>(&scene.scan)}) {
+    std::vector<double> told;
+    const KeepGoing note = [&](double fraction) {
+      told.push_back(fraction);
+      return true;
+    };
+    const auto expect_told = [&] {
+      ASSERT_FALSE(told.empty());
+      EXPECT_TRUE(std::ranges::is_sorted(told));
+      EXPECT_DOUBLE_EQ(told.back(), 1.0);
+      told.clear();
+    };
+    auto bone = BoneHu::make(scene.bone, scan, note);
+    ASSERT_TRUE(bone.has_value());
+    expect_told();
+    const auto stop = [](double) { return false; };
+    const auto stopped = BoneHu::make(scene.bone, scan, stop);
+    ASSERT_FALSE(stopped.has_value());
+    EXPECT_EQ(stopped.error().code, ErrorCode::cancelled);
+    const Result<void> half = bone->renew(only(field), stop);
+    ASSERT_FALSE(half.has_value());
+    EXPECT_EQ(half.error().code, ErrorCode::cancelled);
+    ASSERT_TRUE(bone->renew(only(field), note).has_value());
+    expect_told();
+    auto at_once = BoneHu::make(scene.bone, scan);
+    ASSERT_TRUE(at_once.has_value() && at_once->renew(only(field)).has_value());
+    EXPECT_EQ(all_hu(*bone), all_hu(*at_once));
+  }
 }
 
 TEST(BoneHu, RefusesAScanWithoutHu) {

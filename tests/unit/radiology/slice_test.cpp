@@ -30,7 +30,7 @@ BoneHu cut_ball(CutField& field) {
   for (const Cut& cut : test::grazing_cuts(200, random)) field.apply(cut);
   auto made = BoneHu::make(field.bone());
   EXPECT_TRUE(made.has_value());
-  made->renew(std::vector<const CutField*>{&field});
+  EXPECT_TRUE(made->renew(std::vector<const CutField*>{&field}).has_value());
   return std::move(*made);
 }
 
