@@ -69,12 +69,13 @@ class Parts {
   bool stopped_ = false;
 };
 
+// Up to the faces of the outer voxels, half a voxel beyond their centres.
 Box box_of_scan(const ScanGeometry& geometry) {
   Box box;
   for (int corner = 0; corner < 8; ++corner)
-    box.include(geometry.position_mm(Vec3((corner & 1) != 0 ? geometry.dims[0] - 1 : 0,
-                                          (corner & 2) != 0 ? geometry.dims[1] - 1 : 0,
-                                          (corner & 4) != 0 ? geometry.dims[2] - 1 : 0)));
+    box.include(geometry.position_mm(Vec3((corner & 1) != 0 ? geometry.dims[0] - 0.5 : -0.5,
+                                          (corner & 2) != 0 ? geometry.dims[1] - 0.5 : -0.5,
+                                          (corner & 4) != 0 ? geometry.dims[2] - 0.5 : -0.5)));
   return box;
 }
 

@@ -14,8 +14,8 @@
 namespace osteon::radiology {
 
 // [A] Density without a line of its own, as of a mesh, becomes HU by this one. It is an extrapolation in cortex: bone
-// of 1.92 g/cm³ has 1677 HU by it, and 1593.5 by its coefficients (attenuation.hpp). So cortex
-// weakens rays 4 % too much.
+// of 1.92 g/cm³ has 1677 HU by it, and 1593.5 by its coefficients (attenuation.hpp). So cortex weakens
+// rays 4 % too much.
 inline constexpr DensityCalibration kDefaultLine = kRho1995;
 
 // What sampling reads: attenuation in steps (attenuation.hpp), z fastest. All outer samples are air, and one more value

@@ -50,7 +50,8 @@ struct ExposureControl {
                                            const ExposureControl& control);
 // Replaces the means in a box by numbers of photons at random (Poisson). The noise of a pixel follows from the seed,
 // its mean and its place in the image alone. So after a change, the boxes that count_photons() set again get the noise
-// that the whole image would have.
+// that the whole image would have. Its logarithm and cosine are those of the C library, so another library may give
+// other numbers.
 void add_quantum_noise(const PixelGrid& detector, const PixelBox& box, std::uint64_t seed, std::span<float> photons);
 // Spreads a part of the light: veiling glare. The sum of all pixels stays, but for what leaves the image.
 // Light spreads far, so this step takes the whole image, on a copy of the photons, as those after it do.

@@ -114,6 +114,19 @@ TEST(BoneHu, MetalOfTheCaseIsMetalInAScanToo) {
   EXPECT_NEAR(hu->attenuation_per_mm({0, 0, -4}), attenuation_per_mm(3071.0), 1e-4);
 }
 
+// Slices of 4 mm, from -12 to 8 mm with their halves beyond the outer centres.
+TEST(BoneHu, AThickSliceCountsToItsFaces) {
+  CaseScan scan;
+  scan.geometry = {{21, 21, 5}, Vec3(-5.0, -5.0, -10.0), Vec3(0.5, 0.5, 4.0).asDiagonal()};
+  scan.hu.assign(scan.geometry.count(), 500);
+  const auto hu = BoneHu::make(test::plain_block(4.0, 4.0, 0.5), &scan);
+  ASSERT_TRUE(hu.has_value());
+  for (const std::int32_t z : {-24, -23, 0, 15, 16})
+    EXPECT_NEAR(static_cast<double>(hu->hu({0, 0, z})), 500.0, 0.4) << 0.5 * z << " mm";
+  EXPECT_EQ(hu->hu({0, 0, -25}), -1000.0f);
+  EXPECT_EQ(hu->hu({0, 0, 17}), -1000.0f);
+}
+
 // The highest HU that a file of 16 bits can have.
 TEST(BoneHu, NoHuOfAScanIsTooHigh) {
   CaseScan scan;
