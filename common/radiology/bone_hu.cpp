@@ -358,8 +358,19 @@ CoordBox BoneHu::renew_box(std::span<const CutField* const> bodies, const CoordB
   return changed;
 }
 
+// Returns whether a body that was there the last time is not any more.
+bool BoneHu::note_bodies(std::span<const CutField* const> bodies) {
+  const bool gone = std::ranges::any_of(seen_, [&](BodyId id) {
+    return std::ranges::none_of(bodies, [&](const CutField* body) { return body->body() == id; });
+  });
+  seen_.clear();
+  for (const CutField* body : bodies) seen_.push_back(body->body());
+  return gone;
+}
+
 Result<void> BoneHu::renew(std::span<const CutField* const> bodies, const KeepGoing& keep_going) {
   OSTEON_CHECK(!bodies.empty());
+  note_bodies(bodies);
   Parts parts(keep_going, parts_in(box_, kPartSide));
   each_part(box_, kPartSide, [&](const CoordBox& part) {
     if (parts.stopped()) return;
@@ -380,6 +391,11 @@ std::vector<CoordBox> BoneHu::update(std::span<const CutField* const> bodies, st
     note_occupied(found);
     changed.push_back(found);
   };
+  // A body that is gone was whole where it has no leaf, so its leaves do not tell what changed.
+  if (note_bodies(bodies)) {
+    each_part(box_, kPartSide, renew_part);
+    return changed;
+  }
   for (const ChangedLeaves& change : changes) {
     CoordBox all;
     double samples = 0.0;

@@ -44,7 +44,7 @@ class BoneHu {
   // One thread; seconds for the largest bones. Error: cancelled; some samples are then as before, so renew again.
   [[nodiscard]] Result<void> renew(std::span<const CutField* const> bodies, const KeepGoing& keep_going = {});
   // The same for leaves that changed since. Returns boxes that hold every sample with another value than before.
-  // Afterwards all is as after renew().
+  // Afterwards all is as after renew(). When a body is gone, it looks at every sample, as renew() does.
   std::vector<CoordBox> update(std::span<const CutField* const> bodies, std::span<const ChangedLeaves> changes);
 
   [[nodiscard]] double pitch_mm() const { return bone_.pitch_mm(); }
@@ -64,6 +64,7 @@ class BoneHu {
   void restore(const CoordBox& box);
   void cut(std::span<const CutField* const> bodies, const CoordBox& box);
   CoordBox renew_box(std::span<const CutField* const> bodies, const CoordBox& box);
+  bool note_bodies(std::span<const CutField* const> bodies);
   void note_occupied(const CoordBox& box);
   [[nodiscard]] bool any_cut(std::span<const CutField* const> bodies, const CoordBox& box) const;
   [[nodiscard]] std::size_t index(Coord sample) const;
@@ -74,6 +75,7 @@ class BoneHu {
   Coord bricks_;
   int level_ = 0;  // the finest of the case's cuts
   bool from_scan_ = false;
+  std::vector<BodyId> seen_;  // the bodies of the last renew() or update()
   std::vector<std::uint16_t> uncut_, steps_;
   std::vector<std::uint8_t> occupied_;
 };
