@@ -10,7 +10,6 @@
 #include <cmath>
 #include <cstdio>
 #include <functional>
-#include <numbers>
 
 #include "common/radiology/attenuation.hpp"
 #include "common/radiology/intensifier.hpp"
