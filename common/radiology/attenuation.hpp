@@ -10,6 +10,9 @@ namespace osteon::radiology {
 inline constexpr double kWater_per_mm = 0.02269, kCorticalBone_per_mm = 0.08145;
 // Titanium of 4.54 g/cm³ (1.213 cm²/g). Iron of 7.87 g/cm³ (1.958 cm²/g) stands for steel.
 inline constexpr double kTitanium_per_mm = 0.5507, kSteel_per_mm = 1.541;
+// [A] Metal of a case: its importer finds that there is metal, and not which. Titanium would weaken a ray a third as
+// much.
+inline constexpr double kMetal_per_mm = kSteel_per_mm;
 // HU of that bone in a CT scan. [A] The scanner's spectrum is like 70 keV: between the coefficients at 60 and 80 keV on
 // logarithmic scales, bone has 0.2616 cm²/g and water 0.1937 cm²/g.
 inline constexpr double kCorticalBone_hu = 1593.5;
@@ -23,13 +26,18 @@ inline constexpr double kCorticalBone_hu = 1593.5;
 }
 
 // Attenuation is kept in steps of a part of water's, because it is in proportion to the matter in a voxel: half a voxel
-// of bone weakens a ray half as much. HU above water are not: they rise less than attenuation does.
+// of bone weakens a ray half as much. HU above water are not: they rise less than attenuation does. 16 bits hold steel,
+// and all HU that a scan of 16 bits can have.
 inline constexpr float kAir_hu = -1000.0f;
-inline constexpr float kStepsOfWater = 4000.0f;
+inline constexpr float kStepsOfWater = 950.0f;
 inline constexpr double kStep_per_mm = kWater_per_mm / static_cast<double>(kStepsOfWater);
-inline constexpr float kHuPerStepBelowWater = 0.25f;
+inline constexpr float kHuPerStepBelowWater = -kAir_hu / kStepsOfWater;  // 1.05 HU
 inline constexpr float kHuPerStepAboveWater =
-    static_cast<float>(kStep_per_mm * kCorticalBone_hu / (kCorticalBone_per_mm - kWater_per_mm));  // 0.154 HU
+    static_cast<float>(kStep_per_mm * kCorticalBone_hu / (kCorticalBone_per_mm - kWater_per_mm));  // 0.65 HU
+
+inline constexpr double kMostSteps = 65535.0;
+static_assert(kMostSteps * kStep_per_mm > kMetal_per_mm);
+static_assert(kMostSteps * kStep_per_mm > attenuation_per_mm(32767.0));
 
 // HU of some steps: the inverse of attenuation_per_mm().
 [[nodiscard]] constexpr float hu_of_steps(float steps) {

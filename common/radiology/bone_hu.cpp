@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 
 #include "common/core/check.hpp"
 #include "common/core/large_pages.hpp"
@@ -18,10 +17,8 @@ std::size_t samples_in(const CoordBox& box) {
   return to_index(d.x) * to_index(d.y) * to_index(d.z);
 }
 
-std::uint16_t to_steps(double hu, float part = 1.0f) {
-  constexpr float most = std::numeric_limits<std::uint16_t>::max();
-  const auto steps = static_cast<float>(attenuation_per_mm(hu) / kStep_per_mm);
-  return static_cast<std::uint16_t>(std::min(part * steps, most - 0.5f) + 0.5f);
+std::uint16_t rounded_steps(double per_mm) {
+  return static_cast<std::uint16_t>(std::min(per_mm / kStep_per_mm, kMostSteps - 0.5) + 0.5);
 }
 
 // The part of a sample's voxel that is solid, from the distance to the surface.
@@ -50,12 +47,35 @@ void each_part(const CoordBox& box, std::int32_t side, Call call) {
         call(intersection(box, {{x, y, z}, {x + side - 1, y + side - 1, z + side - 1}}));
 }
 
+std::size_t parts_in(const CoordBox& box, std::int32_t side) {
+  std::size_t parts = 0;
+  each_part(box, side, [&](const CoordBox&) { ++parts; });
+  return parts;
+}
+
+// Asks after each of some equal parts of long work whether to go on.
+class Parts {
+ public:
+  Parts(const KeepGoing& keep_going, std::size_t count) : keep_going_(keep_going), count_(static_cast<double>(count)) {}
+  void next() {
+    done_ += 1.0;
+    if (!stopped_ && keep_going_) stopped_ = !keep_going_(done_ / count_);
+  }
+  [[nodiscard]] bool stopped() const { return stopped_; }
+
+ private:
+  const KeepGoing& keep_going_;
+  double count_, done_ = 0.0;
+  bool stopped_ = false;
+};
+
+// Up to the faces of the outer voxels, half a voxel beyond their centres.
 Box box_of_scan(const ScanGeometry& geometry) {
   Box box;
   for (int corner = 0; corner < 8; ++corner)
-    box.include(geometry.position_mm(Vec3((corner & 1) != 0 ? geometry.dims[0] - 1 : 0,
-                                          (corner & 2) != 0 ? geometry.dims[1] - 1 : 0,
-                                          (corner & 4) != 0 ? geometry.dims[2] - 1 : 0)));
+    box.include(geometry.position_mm(Vec3((corner & 1) != 0 ? geometry.dims[0] - 0.5 : -0.5,
+                                          (corner & 2) != 0 ? geometry.dims[1] - 0.5 : -0.5,
+                                          (corner & 4) != 0 ? geometry.dims[2] - 0.5 : -0.5)));
   return box;
 }
 
@@ -147,7 +167,7 @@ BoneHu::BoneHu(Case bone, const CoordBox& box)
   occupied_.assign(to_index(bricks_.x) * to_index(bricks_.y) * to_index(bricks_.z), 0);
 }
 
-Result<BoneHu> BoneHu::make(const Case& bone, const CaseScan* scan) {
+Result<BoneHu> BoneHu::make(const Case& bone, const CaseScan* scan, const KeepGoing& keep_going) {
   CoordBox box = bone.bounds_samples();
   if (scan) {
     const ScanGeometry& geometry = scan->geometry;
@@ -161,22 +181,23 @@ Result<BoneHu> BoneHu::make(const Case& bone, const CaseScan* scan) {
                    "the bone has too many samples for slices and radiographs; import it with a "
                    "coarser --pitch");
   BoneHu made(bone, box);
-  if (scan)
-    made.fill_from_scan(*scan);
-  else
-    made.fill_from_density();
+  const bool whole = scan ? made.fill_from_scan(*scan, keep_going) : made.fill_from_density(keep_going);
+  if (!whole) return stopped_while("preparing slices and radiographs");
+  made.fill_metal();
   made.steps_ = made.uncut_;
   made.note_occupied(box);
   return made;
 }
 
-void BoneHu::fill_from_density() {
+bool BoneHu::fill_from_density(const KeepGoing& keep_going) {
   const DensityCalibration given = bone_.info().calibration;
   const DensityCalibration line = given.slope_g_cm3_per_hu > 0.0 ? given : kDefaultLine;
   const auto slope = static_cast<float>(line.slope_g_cm3_per_hu);
   const auto intercept = static_cast<float>(line.intercept_g_cm3), pitch = static_cast<float>(pitch_mm());
   std::vector<float> surface, density;
+  Parts parts(keep_going, parts_in(box_, 4 * kPartSide));
   each_part(box_, 4 * kPartSide, [&](const CoordBox& part) {
+    if (parts.stopped()) return;
     surface.resize(samples_in(part));
     density.resize(samples_in(part));
     bone_.gather_surface(part, surface);
@@ -186,22 +207,59 @@ void BoneHu::fill_from_density() {
       for (std::int32_t y = part.min.y; y <= part.max.y; ++y) {
         std::uint16_t* to = uncut_.data() + index({x, y, part.min.z});
         for (std::int32_t z = part.min.z; z <= part.max.z; ++z, ++i, ++to)
-          *to = to_steps(static_cast<double>((density[i] - intercept) / slope), solid_part(surface[i], pitch));
+          *to = rounded_steps(static_cast<double>(solid_part(surface[i], pitch)) *
+                              radiology::attenuation_per_mm(static_cast<double>((density[i] - intercept) / slope)));
       }
+    parts.next();
   });
+  return !parts.stopped();
 }
 
-void BoneHu::fill_from_scan(const CaseScan& scan) {
+bool BoneHu::fill_from_scan(const CaseScan& scan, const KeepGoing& keep_going) {
   from_scan_ = true;
   const Eigen::Matrix3d to_voxels = scan.geometry.axes_mm.inverse();
-  for (std::int32_t x = box_.min.x; x <= box_.max.x; ++x)
+  Parts planes(keep_going, to_index(box_.dims().x));
+  for (std::int32_t x = box_.min.x; x <= box_.max.x && !planes.stopped(); ++x) {
     for (std::int32_t y = box_.min.y; y <= box_.max.y; ++y) {
       std::uint16_t* to = uncut_.data() + index({x, y, box_.min.z});
       for (std::int32_t z = box_.min.z; z <= box_.max.z; ++z, ++to) {
         const Vec3 voxel = to_voxels * (position_mm({x, y, z}, pitch_mm()) - scan.geometry.origin_mm);
-        *to = to_steps(static_cast<double>(scan_hu(scan, voxel)));
+        *to = rounded_steps(radiology::attenuation_per_mm(static_cast<double>(scan_hu(scan, voxel))));
       }
     }
+    planes.next();
+  }
+  return !planes.stopped();
+}
+
+// Neither density, which ends at compact bone, nor the HU of most scanners tell how dense metal is. Only samples within
+// the surface are labelled. So a sample of the skin is metal if one beside it is.
+void BoneHu::fill_metal() {
+  std::vector<float> surface;
+  const auto is_metal = [&](Coord sample, float distance_mm) {
+    if (distance_mm < 0.0f) return bone_.tissue(sample) == Tissue::metal;
+    bool any = false;
+    for (std::int32_t n = 0; n < 27; ++n)
+      any |= bone_.tissue(sample + Coord{n / 9 - 1, n / 3 % 3 - 1, n % 3 - 1}) == Tissue::metal;
+    return any;
+  };
+  for (const Coord leaf : bone_.metal_leaves()) {
+    const std::int32_t last = kLeafSize - 1;
+    // The skin may be in the next leaf. A sample that two leaves reach is filled twice, with the same value.
+    const CoordBox part = intersection(CoordBox{leaf, leaf + Coord{last, last, last}}.grown(1), box_);
+    if (part.empty()) continue;
+    surface.resize(samples_in(part));
+    bone_.gather_surface(part, surface);
+    std::size_t i = 0;
+    for (std::int32_t x = part.min.x; x <= part.max.x; ++x)
+      for (std::int32_t y = part.min.y; y <= part.max.y; ++y) {
+        std::uint16_t* to = uncut_.data() + index({x, y, part.min.z});
+        for (std::int32_t z = part.min.z; z <= part.max.z; ++z, ++i, ++to) {
+          const double solid = static_cast<double>(solid_part(surface[i], static_cast<float>(pitch_mm())));
+          if (solid > 0.0 && is_metal({x, y, z}, surface[i])) *to = std::max(*to, rounded_steps(solid * kMetal_per_mm));
+        }
+      }
+  }
 }
 
 std::size_t BoneHu::index(Coord sample) const {
@@ -300,10 +358,28 @@ CoordBox BoneHu::renew_box(std::span<const CutField* const> bodies, const CoordB
   return changed;
 }
 
-void BoneHu::renew(std::span<const CutField* const> bodies) {
+// Returns whether a body that was there the last time is not any more.
+bool BoneHu::note_bodies(std::span<const CutField* const> bodies) {
+  const bool gone = std::ranges::any_of(seen_, [&](BodyId id) {
+    return std::ranges::none_of(bodies, [&](const CutField* body) { return body->body() == id; });
+  });
+  seen_.clear();
+  for (const CutField* body : bodies) seen_.push_back(body->body());
+  return gone;
+}
+
+Result<void> BoneHu::renew(std::span<const CutField* const> bodies, const KeepGoing& keep_going) {
   OSTEON_CHECK(!bodies.empty());
-  each_part(box_, kPartSide, [&](const CoordBox& part) { renew_box(bodies, part); });
+  note_bodies(bodies);
+  Parts parts(keep_going, parts_in(box_, kPartSide));
+  each_part(box_, kPartSide, [&](const CoordBox& part) {
+    if (parts.stopped()) return;
+    renew_box(bodies, part);
+    parts.next();
+  });
   note_occupied(box_);
+  if (parts.stopped()) return stopped_while("renewing slices and radiographs");
+  return {};
 }
 
 std::vector<CoordBox> BoneHu::update(std::span<const CutField* const> bodies, std::span<const ChangedLeaves> changes) {
@@ -315,6 +391,11 @@ std::vector<CoordBox> BoneHu::update(std::span<const CutField* const> bodies, st
     note_occupied(found);
     changed.push_back(found);
   };
+  // A body that is gone was whole where it has no leaf, so its leaves do not tell what changed.
+  if (note_bodies(bodies)) {
+    each_part(box_, kPartSide, renew_part);
+    return changed;
+  }
   for (const ChangedLeaves& change : changes) {
     CoordBox all;
     double samples = 0.0;

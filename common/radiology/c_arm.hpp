@@ -2,6 +2,7 @@
 #pragma once
 #include <optional>
 
+#include "common/core/result.hpp"
 #include "common/geometry/lattice.hpp"
 #include "common/radiology/pixel_grid.hpp"
 
@@ -20,10 +21,12 @@ struct ConeBeam {
 // [A] Dimensions of a usual mobile C-arm with a detector of 30 cm.
 struct CArm {
   Vec3 isocentre_mm = Vec3::Zero();  // what both rotations are about, in the bone's frame (LPS)
-  // About the patient's long axis. At 0 the tube is under the table, behind the patient, and the detector in front of
-  // the patient. Positive angles move the detector to the patient's left.
-  double orbit_rad = 0.0;
-  double tilt_rad = 0.0;  // moves the detector towards the head
+  // Both as DICOM has them for a positioner (PS3.3 C.8.7.5), but in radians. The detector lies in the direction
+  // (sin orbit · cos tilt, −cos orbit · cos tilt, sin tilt) from the isocentre. So the orbit is about the patient's
+  // long axis, and the tilt about an axis that the orbit has turned. At 0 the tube is under the table, behind the
+  // patient, and the detector in front of the patient.
+  double orbit_rad = 0.0;  // Positioner Primary Angle: moves the detector to the patient's left (LAO is positive)
+  double tilt_rad = 0.0;   // Positioner Secondary Angle: moves the detector towards the head (CRA is positive)
   Vec3 translation_mm = Vec3::Zero();
   double source_detector_mm = 1000.0;
   double source_isocentre_mm = 600.0;
@@ -35,6 +38,10 @@ struct CArm {
 enum class View { anteroposterior, lateral, axial };
 [[nodiscard]] CArm c_arm_at(View view, const Vec3& isocentre_mm);
 
-[[nodiscard]] ConeBeam beam_of(const CArm& arm);
+// Error: invalid_input, naming the field: a length or an angle that is no number, a distance or a width that is not
+// above zero, or a side of the image that is not from 1 to kMostPixelsOfSide.
+[[nodiscard]] Result<ConeBeam> beam_of(const CArm& arm);
+inline constexpr int kMostPixelsOfSide = 8192;
+inline constexpr double kMostOfCArm_mm = 1e6;  // of any length
 
 }  // namespace osteon::radiology

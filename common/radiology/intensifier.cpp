@@ -16,6 +16,9 @@ constexpr double kPhotonsPerMm2PerUgy = 1e-6 / (kJoulePerPhoton * 0.004098) * 1e
 // From this mean on, a normal distribution stands for that of Poisson. Its skewness is then below 0.13.
 constexpr double kNormalFrom = 60.0;
 constexpr double kMetre_mm = 1000.0;
+constexpr double kMostGlare_pixels = 1e8;
+constexpr double kMostKerma_ugy = 1e9;
+constexpr float kMostPhotons = 1e30f, kLeastContrast = 1.01f;
 
 // SplitMix64 (Steele 2014), with a state of its own for each pixel.
 class PixelRandom {
@@ -66,7 +69,42 @@ void blur_line(float* line, std::ptrdiff_t stride, int count, int half, std::vec
 
 }  // namespace
 
+Result<void> check(const Exposure& exposure) {
+  if (!(exposure.air_kerma_at_metre_ugy >= 0.0 && exposure.air_kerma_at_metre_ugy <= kMostKerma_ugy))
+    return bad_field("the exposure's air_kerma_at_metre_ugy", "must be from 0 to 1e9");
+  return {};
+}
+
+Result<void> check(const Intensifier& intensifier) {
+  if (!(intensifier.detected > 0.0 && intensifier.detected <= 1.0))
+    return bad_field("the intensifier's detected", "must be above 0 and at most 1");
+  if (!(intensifier.glare >= 0.0 && intensifier.glare <= 1.0))
+    return bad_field("the intensifier's glare", "must be from 0 to 1");
+  if (!(intensifier.glare_radius_mm >= 0.0 && intensifier.glare_radius_mm <= kMostOfCArm_mm))
+    return bad_field("the intensifier's glare_radius_mm", "must be from 0 to 1e6");
+  return {};
+}
+
+Result<void> check(const Contrast& contrast) {
+  if (!(contrast.black > 0.0f && contrast.black <= kMostPhotons))
+    return bad_field("the contrast's black", "must be above 0 and at most 1e30");
+  if (!(contrast.white >= kLeastContrast * contrast.black && contrast.white <= kMostPhotons))
+    return bad_field("the contrast's white", "must be at least 1.01 times its black and at most 1e30");
+  return {};
+}
+
+Result<void> check(const ExposureControl& control) {
+  if (!(control.photons_per_mm2 > 0.0 && control.photons_per_mm2 <= static_cast<double>(kMostPhotons)))
+    return bad_field("the exposure control's photons_per_mm2", "must be above 0 and at most 1e30");
+  if (!(control.least_kerma_ugy >= 0.0 && control.least_kerma_ugy <= kMostKerma_ugy))
+    return bad_field("the exposure control's least_kerma_ugy", "must be from 0 to 1e9");
+  if (!(control.most_kerma_ugy >= control.least_kerma_ugy && control.most_kerma_ugy <= kMostKerma_ugy))
+    return bad_field("the exposure control's most_kerma_ugy", "must be from its least_kerma_ugy to 1e9");
+  return {};
+}
+
 double dose_area_gy_cm2(const ConeBeam& beam, const Exposure& exposure) {
+  OSTEON_CHECK(check(exposure).has_value());
   const PixelGrid& grid = beam.detector;
   const Vec3 cross = grid.column_mm.cross(grid.row_mm);
   const double distance = std::abs(cross.normalized().dot(grid.first_mm - beam.source_mm));
@@ -75,36 +113,63 @@ double dose_area_gy_cm2(const ConeBeam& beam, const Exposure& exposure) {
   return exposure.air_kerma_at_metre_ugy * 1e-6 * area_mm2 * at_metre * at_metre * 0.01;
 }
 
-std::vector<float> photons_at(const ConeBeam& beam, std::span<const float> attenuation, const Exposure& exposure,
-                              const Intensifier& intensifier) {
+void count_photons(const ConeBeam& beam, const Layers& layers, const Exposure& exposure, const Intensifier& intensifier,
+                   const PixelBox& box, std::span<float> photons) {
   const PixelGrid& grid = beam.detector;
-  OSTEON_CHECK(attenuation.size() == grid.count());
+  OSTEON_CHECK(photons.size() == grid.count() && grid.holds(box) && layers.bone.size() == grid.count());
+  OSTEON_CHECK(layers.metal.empty() || layers.metal.size() == grid.count());
+  OSTEON_CHECK(check(exposure).has_value() && check(intensifier).has_value());
   const Vec3 cross = grid.column_mm.cross(grid.row_mm), normal = cross.normalized();
   const double at_metre = kPhotonsPerMm2PerUgy * exposure.air_kerma_at_metre_ugy * cross.norm() * intensifier.detected;
-  std::vector<float> photons(attenuation.size());
-  for (int row = 0; row < grid.rows; ++row)
-    for (int column = 0; column < grid.columns; ++column) {
+  for (int row = box.first_row; row <= box.last_row; ++row)
+    for (int column = box.first_column; column <= box.last_column; ++column) {
       const Vec3 ray = grid.at(column, row) - beam.source_mm;
       const double square = ray.squaredNorm(), cosine = std::abs(normal.dot(ray)) / std::sqrt(square);
       const std::size_t i = grid.index(column, row);
+      const double metal = layers.metal.empty() ? 0.0 : static_cast<double>(layers.metal[i]);
       photons[i] = static_cast<float>(at_metre * kMetre_mm * kMetre_mm / square * cosine *
-                                      std::exp(-static_cast<double>(attenuation[i])));
+                                      std::exp(-(static_cast<double>(layers.bone[i]) + metal)));
     }
-  return photons;
 }
 
-void add_quantum_noise(std::span<float> photons, std::uint64_t seed) {
-  for (std::size_t i = 0; i < photons.size(); ++i) {
-    PixelRandom random(seed, i);
-    photons[i] = static_cast<float>(poisson(static_cast<double>(photons[i]), random));
-  }
+Exposure controlled_exposure(const ConeBeam& beam, const Layers& layers, const Intensifier& intensifier,
+                             const ExposureControl& control) {
+  OSTEON_CHECK(check(control).has_value());
+  const PixelGrid& grid = beam.detector;
+  const PixelBox middle{grid.columns / 4, grid.rows / 4, grid.columns - 1 - grid.columns / 4,
+                        grid.rows - 1 - grid.rows / 4};
+  // Photons are in proportion to kerma, so those of 1 µGy tell what is needed.
+  std::vector<float> photons(grid.count());
+  count_photons(beam, layers, {.air_kerma_at_metre_ugy = 1.0}, intensifier, middle, photons);
+  double sum = 0.0, pixels = 0.0;
+  for (int row = middle.first_row; row <= middle.last_row; ++row)
+    for (int column = middle.first_column; column <= middle.last_column; ++column, pixels += 1.0)
+      sum += static_cast<double>(photons[grid.index(column, row)]);
+  const double needed = control.photons_per_mm2 * grid.column_mm.cross(grid.row_mm).norm() * pixels;
+  // Behind metal that lets no photon through, the tube does what it can.
+  const double kerma_ugy = sum * control.most_kerma_ugy > needed ? needed / sum : control.most_kerma_ugy;
+  return {std::max(kerma_ugy, control.least_kerma_ugy)};
+}
+
+void add_quantum_noise(const PixelGrid& detector, const PixelBox& box, std::uint64_t seed, std::span<float> photons) {
+  OSTEON_CHECK(photons.size() == detector.count() && detector.holds(box));
+  for (int row = box.first_row; row <= box.last_row; ++row)
+    for (int column = box.first_column; column <= box.last_column; ++column) {
+      const std::size_t i = detector.index(column, row);
+      PixelRandom random(seed, i);
+      photons[i] = static_cast<float>(poisson(static_cast<double>(photons[i]), random));
+    }
 }
 
 void add_glare(const PixelGrid& detector, const Intensifier& intensifier, std::span<float> photons) {
   OSTEON_CHECK(photons.size() == detector.count());
+  OSTEON_CHECK(check(intensifier).has_value());
   std::vector<float> veil(photons.begin(), photons.end());
   std::vector<double> sums;
-  const auto half = [&](double pixel_mm) { return static_cast<int>(intensifier.glare_radius_mm / pixel_mm); };
+  // A square that is wider than the image spreads light beyond it, but needs no number that an int cannot hold.
+  const auto half = [&](double pixel_mm) {
+    return static_cast<int>(std::min(intensifier.glare_radius_mm / pixel_mm, kMostGlare_pixels));
+  };
   for (int row = 0; row < detector.rows; ++row)
     blur_line(veil.data() + detector.index(0, row), 1, detector.columns, half(detector.column_mm.norm()), sums);
   for (int column = 0; column < detector.columns; ++column)
@@ -113,7 +178,7 @@ void add_glare(const PixelGrid& detector, const Intensifier& intensifier, std::s
   for (std::size_t i = 0; i < photons.size(); ++i) photons[i] += part * (veil[i] - photons[i]);
 }
 
-Contrast automatic_contrast(std::span<const float> photons) {
+Contrast automatic_window(std::span<const float> photons) {
   OSTEON_CHECK(!photons.empty());
   std::vector<float> sorted(photons.begin(), photons.end());
   const std::size_t hundredth = sorted.size() / 100;
@@ -122,11 +187,12 @@ Contrast automatic_contrast(std::span<const float> photons) {
     return std::max(sorted[place], 1.0f);
   };
   Contrast contrast{value(hundredth), value(sorted.size() - 1 - hundredth)};
-  contrast.white = std::max(contrast.white, contrast.black * 1.01f);
+  contrast.white = std::max(contrast.white, contrast.black * kLeastContrast);
   return contrast;
 }
 
 std::vector<std::uint8_t> grey_of(std::span<const float> photons, const Contrast& contrast) {
+  OSTEON_CHECK(check(contrast).has_value());
   const float black = std::log(contrast.black), range = std::log(contrast.white) - black;
   std::vector<std::uint8_t> grey(photons.size());
   std::ranges::transform(photons, grey.begin(), [&](float count) {

@@ -41,14 +41,19 @@ double length_in(const Implicit& solid, const Vec3& from_mm, const Vec3& to_mm) 
   return inside;
 }
 
-void add_metal(const ConeBeam& beam, std::span<const MetalSolid> solids, std::span<float> attenuation) {
-  OSTEON_CHECK(attenuation.size() == beam.detector.count());
-  for (const MetalSolid& metal : solids) {
-    const PixelBox shadow = shadow_of(metal.solid.bounds, beam);
+void cast_metal(const ConeBeam& beam, std::span<const MetalSolid> solids, const PixelBox& box, std::span<float> metal) {
+  const PixelGrid& grid = beam.detector;
+  OSTEON_CHECK(metal.size() == grid.count() && grid.holds(box));
+  if (box.empty()) return;
+  for (int row = box.first_row; row <= box.last_row; ++row)
+    std::fill(metal.data() + grid.index(box.first_column, row), metal.data() + grid.index(box.last_column, row) + 1,
+              0.0f);
+  for (const MetalSolid& one : solids) {
+    const PixelBox shadow = shadow_of(one.solid.bounds, beam).common(box);
     for (int row = shadow.first_row; row <= shadow.last_row; ++row)
       for (int column = shadow.first_column; column <= shadow.last_column; ++column)
-        attenuation[beam.detector.index(column, row)] += static_cast<float>(
-            metal.attenuation_per_mm * length_in(metal.solid, beam.source_mm, beam.detector.at(column, row)));
+        metal[grid.index(column, row)] +=
+            static_cast<float>(one.attenuation_per_mm * length_in(one.solid, beam.source_mm, grid.at(column, row)));
   }
 }
 

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/core/check.hpp"
 #include "common/radiology/attenuation.hpp"
 #include "common/radiology/sampling.hpp"
 
@@ -200,11 +201,12 @@ bool merge_once(std::vector<PixelBox>& boxes) {
 
 }  // namespace
 
-Radiograph::Radiograph(const ConeBeam& beam) : beam_(beam), attenuation_(beam.detector.count(), 0.0f) {}
-
-void Radiograph::cast(const BoneHu& bone) {
-  cast_box(bone, {0, 0, beam_.detector.columns - 1, beam_.detector.rows - 1});
+Radiograph::Radiograph(const ConeBeam& beam) : beam_(beam) {
+  OSTEON_CHECK(beam.detector.columns > 0 && beam.detector.rows > 0);
+  attenuation_.resize(beam.detector.count());
 }
+
+void Radiograph::cast(const BoneHu& bone) { cast_box(bone, beam_.detector.whole()); }
 
 std::vector<PixelBox> Radiograph::recast(const BoneHu& bone, std::span<const CoordBox> changed) {
   std::vector<PixelBox> boxes;

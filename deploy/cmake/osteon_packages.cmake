@@ -28,8 +28,9 @@ find_package(ZLIB REQUIRED)
 find_package(OpenSSL REQUIRED)
 find_package(prometheus-cpp REQUIRED)
 find_package(VTK 9.1 REQUIRED COMPONENTS
-  CommonCore CommonDataModel FiltersCore FiltersSources FiltersGeneral IOImage
-  GUISupportQt InteractionStyle RenderingCore RenderingOpenGL2 RenderingFreeType RenderingAnnotation)
+  CommonCore CommonDataModel FiltersCore FiltersSources FiltersGeneral IOImage ImagingCore
+  GUISupportQt InteractionStyle RenderingCore RenderingOpenGL2 RenderingFreeType RenderingAnnotation
+  RenderingVolume RenderingVolumeOpenGL2)
 
 pkg_check_modules(grpc REQUIRED IMPORTED_TARGET grpc++)
 pkg_check_modules(microhttpd REQUIRED IMPORTED_TARGET libmicrohttpd)

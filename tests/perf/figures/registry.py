@@ -321,6 +321,14 @@ FIGURES = [
     Figure("scene_rate_over_vtk_with_backs", "ratio", "the same, with back faces as VTK draws them unasked", "scene"),
     Figure("scene_frame_million", "ms", "a frame of a million triangles, median", "scene",
            baseline="VTK alone, without back faces"),
+    # Radiographs of 800 x 600 and three slices of 512 x 512, on one thread each, in turns in one run.
+    Figure("radiograph_over_vtk", "ratio", "a whole radiograph of a skull over one of VTK's fixed-point ray caster, "
+           "with samples as far apart as voxels", "radiology", ("<=", 0.7)),
+    Figure("radiograph_changed_over_whole", "ratio", "bringing HU and radiograph up to date after a drill's cut of "
+           "8 ms, over a whole radiograph", "radiology", ("<=", 0.02)),
+    Figure("slices_over_vtk", "ratio", "three slices over those of vtkImageReslice", "radiology", ("<=", 0.5)),
+    Figure("radiograph_difference", "ratio", "mean difference of both radiographs, of the photons that get through",
+           "radiology", ("<=", 0.02)),
     # An hour of drilling, undo and saving in the real window: resident memory by a line through all rounds after ten
     # minutes. In rooms: the case is closed and opened in each round. In a room: it stays open, and all is undone.
     *[Figure(f"window_{kind}_{program.removeprefix('osteon-')}", "percent",

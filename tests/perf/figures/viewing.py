@@ -53,4 +53,30 @@ def skull(run):
     }
 
 
-GROUPS = {"scene": scene, "picture_skull": skull}
+def radiology(run):
+    """A skull from CT with its soft tissue. Without the example, nothing is measured."""
+    source = run.example("Cranium.inv3")
+    if source is None:
+        run.skip("radiology", "the package invesalius-examples is not installed")
+        return {name: Measured(None) for name in ("radiograph_over_vtk", "radiograph_changed_over_whole",
+                                                  "slices_over_vtk", "radiograph_difference")}
+    turns = 60 if run.soak else 15
+    run.say(f"radiographs and slices, {turns} turns")
+    case = run.folder / "radiology"
+    run.output("osteon-import", "ct", source, "--out", case)
+    out = json.loads(run.output("osteon-radiology-bench", case, turns))
+    kinds = ("radiograph_ms", "vtk_radiograph_ms", "changed_ms", "slices_ms", "vtk_slices_ms")
+    run.tables.append((
+        f"a radiograph of 800 x 600, the {out['changed_pixels']} pixels that a cut changed, and three slices of 512 x "
+        f"512; {out['samples']} samples, {out['memory_mb']:.0f} MB",
+        [("ms", "median", "min", "max")] + [(kind, *(f"{out[kind][which]:.3f}" for which in ("p50", "min", "max")))
+                                            for kind in kinds]))
+    return {
+        "radiograph_over_vtk": Measured(over(out["radiograph_ms"], out["vtk_radiograph_ms"])),
+        "radiograph_changed_over_whole": Measured(over(out["changed_ms"], out["radiograph_ms"])),
+        "slices_over_vtk": Measured(over(out["slices_ms"], out["vtk_slices_ms"])),
+        "radiograph_difference": Measured(out["difference"]),
+    }
+
+
+GROUPS = {"scene": scene, "picture_skull": skull, "radiology": radiology}

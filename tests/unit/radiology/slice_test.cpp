@@ -8,6 +8,7 @@
 
 #include "common/radiology/sampling.hpp"
 #include "tests/support/scenes/random_cuts.hpp"
+#include "tests/unit/radiology/reference_hu.hpp"
 
 namespace osteon::radiology {
 namespace {
@@ -29,7 +30,7 @@ BoneHu cut_ball(CutField& field) {
   for (const Cut& cut : test::grazing_cuts(200, random)) field.apply(cut);
   auto made = BoneHu::make(field.bone());
   EXPECT_TRUE(made.has_value());
-  made->renew(std::vector<const CutField*>{&field});
+  EXPECT_TRUE(made->renew(std::vector<const CutField*>{&field}).has_value());
   return std::move(*made);
 }
 
@@ -47,8 +48,15 @@ TEST(Slice, EqualsTheFieldAtItsSamples) {
       const PixelGrid plane{position_mm(corner, h), h * axes[u], h * axes[v], 53, 47};
       const std::vector<float> hu = slice_of(bone, plane);
       for (int row = 0; row < plane.rows; ++row)
-        for (int column = 0; column < plane.columns; ++column)
-          ASSERT_EQ(hu[plane.index(column, row)], bone.hu(corner + column * steps[u] + row * steps[v]));
+        for (int column = 0; column < plane.columns; ++column) {
+          const Coord sample = corner + column * steps[u] + row * steps[v];
+          const float found = hu[plane.index(column, row)];
+          ASSERT_EQ(found, bone.hu(sample));
+          // Against the field itself, for some of them: its definition takes long.
+          if ((column + 3 * row) % 11 == 0) {
+            ASSERT_NEAR(attenuation_per_mm(static_cast<double>(found)), reference_per_mm(field, sample), 5e-5);
+          }
+        }
     }
 }
 
@@ -66,8 +74,8 @@ TEST(Slice, OfALinearFieldIsLinear) {
       const Vec3 p = plane.at(column, row);
       if (p.cwiseAbs().maxCoeff() > 9.0) continue;
       const double density = 1.0 + 0.02 * p.x() - 0.01 * p.y() + 0.03 * p.z();
-      // Samples are rounded to a quarter of a HU.
-      ASSERT_NEAR(static_cast<double>(values[plane.index(column, row)]), (density - 0.131) / 0.001067, 0.14);
+      // Samples are rounded to 0.65 HU.
+      ASSERT_NEAR(static_cast<double>(values[plane.index(column, row)]), (density - 0.131) / 0.001067, 0.35);
       ++inside;
     }
   EXPECT_GT(inside, 2000U);
