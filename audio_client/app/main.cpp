@@ -291,8 +291,7 @@ Result<void> run(const Options& options, Prepared prepared, const StopSignal& st
   if (!room) return tl::unexpected(room.error());
 
   // Opened only now: opening empties the files, and without a server an earlier recording must stay.
-  StateLog states;
-  if (Result<void> opened = states.open(options.state_log_file); !opened) return opened;
+  // The recording first, because another program may have its name.
   if (!options.wav_file.empty()) {
     Result<audio::WavRecorder> opened = audio::WavRecorder::open(
         options.wav_file, output_params.rate_hz, space.listening == audio::Listening::mono ? 1 : 2,
@@ -301,10 +300,17 @@ Result<void> run(const Options& options, Prepared prepared, const StopSignal& st
     recorder = std::move(*opened);
     engine.record_to(*recorder);
   }
+  StateLog states;
+  if (Result<void> opened = states.open(options.state_log_file); !opened) return opened;
   audio::move_to_middle(space, room->bounds.centre_mm());
   engine.listen(space);
   if (output.opened())
-    if (Result<void> started = output.start(); !started && !window->there()) return started;
+    if (Result<void> started = output.start(); !started && !window->there()) {
+      std::error_code ignored;
+      // It has no sound, and the next start would refuse its name.
+      if (recorder && !options.overwrite) std::filesystem::remove(options.wav_file, ignored);
+      return started;
+    }
   log::info("joined", {{"server", options.server}, {"case", room->case_title}, {"output", options.output}});
 
   // The reader and this thread deliver one at a time. Guards the engine's input and `received_at`; clang checks no
@@ -399,7 +405,7 @@ int main(int argc, char** argv) try {
   app.add_option("--wav", options.wav_file,
                  "Record the sound: 48 kHz, 16 bit, both channels, or one with --listen mono")
       ->check(audio::given_name());
-  app.add_flag("--overwrite", options.overwrite, "Replace an existing file of --wav");
+  app.add_flag("--overwrite", options.overwrite, "Replace an existing file of --wav")->needs("--wav");
   app.add_option("--state-log", options.state_log_file,
                  "CSV: when each cutting state was received and when it was played")
       ->check(audio::given_name());

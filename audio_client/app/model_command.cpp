@@ -37,7 +37,7 @@ Result<std::string> run_model(const ModelArguments& a) {
   const StopSignal stop(StopSignal::HangUp::stops);
   StoppableProgress progress(stop, "modelling", kQuietWork);
   const auto made = model_report(*recording, a.refinements, a.seed, [&](double done) { return progress.go_on(done); });
-  if (!made) return stopped_before({a.out, a.play});
+  if (!made || stop.requested()) return stopped_before({a.out, a.play});
   const ModelReport& report = *made;
   std::string text = to_text(report) + recording_notes(*recording);
   if (!a.out.empty()) {

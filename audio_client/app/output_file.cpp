@@ -34,12 +34,12 @@ Result<void> check_output(const std::string& file, const std::string& what, cons
 
 tl::unexpected<Error> stopped_before(const std::vector<std::string>& files) {
   std::string names;
+  int count = 0;
   for (const std::string& file : files)
-    if (!file.empty()) names += (names.empty() ? "" : " and ") + file;
-  const bool several = names.find(" and ") != std::string::npos;
+    if (!file.empty()) names += (count++ == 0 ? "" : " and ") + file;
   return failure(ErrorCode::cancelled, names.empty()
                                            ? std::string("stopped; nothing was written")
-                                           : "stopped; " + names + (several ? " were" : " was") + " not written");
+                                           : "stopped; " + names + (count > 1 ? " were" : " was") + " not written");
 }
 
 Result<void> check_new_folder(const std::string& folder, const std::string& option) {

@@ -68,7 +68,7 @@ Result<std::string> run_preset(const PresetArguments& a) {
   StoppableProgress progress(stop, "modelling", kQuietWork);
   auto made = recorded_preset(recording->samples, recording->rate_hz, *base, params,
                               [&](double done) { return progress.go_on(done); });
-  if (!made && made.error().code == ErrorCode::cancelled) return stopped_before({a.out});
+  if (stop.requested() || (!made && made.error().code == ErrorCode::cancelled)) return stopped_before({a.out});
   if (!made) return failure(made.error().code, a.recording.file + ": " + made.error().message);
   const std::string yaml = to_yaml(made->model);
   if (auto written = write_file(a.out, yaml); !written) return tl::unexpected(written.error());

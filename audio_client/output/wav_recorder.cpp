@@ -119,6 +119,7 @@ Result<WavRecorder> WavRecorder::open(const std::filesystem::path& file, unsigne
   info.samplerate = static_cast<int>(rate_hz);
   info.channels = impl->channels = channels;
   info.format = SF_FORMAT_WAV | SF_FORMAT_PCM_16;
+  errno = 0;
   impl->file = sf_open_fd(*descriptor, SFM_WRITE, &info, SF_TRUE);
   if (!impl->file) {
     return failure(ErrorCode::internal,
