@@ -368,8 +368,7 @@ TEST_F(WrongUse, DoubleClicksOnEverythingDoNoHarm) {
   // The window works on.
   window_->activateWindow();
   for (auto* panel : window_->findChildren<QDockWidget*>()) panel->hide();
-  hold_drill();
-  EXPECT_TRUE(until([&] { return cut(); })) << problem();
+  drill();
   release(middle());
   window_->findChild<QAction*>("start_page")->trigger();
   window_->findChild<QAction*>("start_page")->trigger();
@@ -576,8 +575,7 @@ TEST_F(WrongUse, AKilledAudioClientComesBackAndIsGivenUpInOneSentence) {
   EXPECT_TRUE(until([&] { return bar() == "There is no sound: osteon-audio was ended by force or crashed."; }))
       << problem();
   // Bone can be cut without sound, and whoever switches the sound on again gets it.
-  hold_drill();
-  EXPECT_TRUE(until([&] { return cut(); })) << problem();
+  drill();
   release(middle());
   for (int time = 0; time < 2; ++time) window_->findChild<QAction*>("sound")->trigger();
   EXPECT_TRUE(until([&] { return children("osteon-audio").size() == 1; })) << problem();
