@@ -1198,7 +1198,7 @@
     </message>
     <message>
         <source>The window plays only the rooms that it opened. To hear this one, start: %1</source>
-        <translation>Das Fenster spielt nur Räume, die es selbst geöffnet hat. Um diesen zu hören, starten Sie: %1</translation>
+        <translation>Das Fenster spielt nur Räume, die es öffnete. Starten Sie für diesen: %1</translation>
     </message>
     <message>
         <source>Only a practice room has sound. Open a bone first.</source>
