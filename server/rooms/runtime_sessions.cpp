@@ -180,7 +180,7 @@ void RoomRuntime::Impl::end_sessions(const std::string& why, bool to_return) {
   ended = why;
   may_return = to_return;
   sessions.each([&](SessionSubscriber& subscriber) { to_return ? subscriber.replaced(why) : subscriber.end(why); });
-  field_readers.each([&](FieldSubscriber& reader) OSTEON_REQUIRES(sessions_mutex) { ends(reader); });
+  field_readers.each([&](FieldSubscriber& reader) { to_return ? reader.replaced(why) : reader.end(why); });
 }
 
 bool RoomRuntime::Impl::ends(FieldSubscriber& reader) const {

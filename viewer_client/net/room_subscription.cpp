@@ -460,7 +460,7 @@ auto RoomSubscription::Impl::read_once(OnceCall<Request, Response> call)
         ended.error_code() != grpc::StatusCode::INVALID_ARGUMENT)
       return failure(ErrorCode::unavailable, ended.error_message());
     MutexLock lock(mutex);
-    const auto over = [&]() OSTEON_REQUIRES(mutex) {
+    const auto over = [&, author = author]() OSTEON_REQUIRES(mutex) {
       return ending || failed || (denied && joined.author.value != author);
     };
     changed.wait_for(lock, denied ? options.patience : std::chrono::milliseconds(1000), over);
