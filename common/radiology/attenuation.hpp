@@ -1,7 +1,7 @@
 // How matter weakens X-rays: I = I0 · exp(−∫ μ dl), the law of Beer and Lambert, for one energy.
 //
-// μ = (μ/ρ) · ρ, with the mass attenuation coefficients μ/ρ of Hubbell 1995 at 50 keV. [A] One energy stands for the
-// spectrum of a C-arm's tube at some 80 kV. So there is no beam hardening, and scatter is left out.
+// μ = (μ/ρ) · ρ, with the mass attenuation coefficients μ/ρ of Hubbell 1995 at 50 keV. [A] One energy stands
+// for the spectrum of a C-arm's tube at some 80 kV. So there is no beam hardening, and scatter is left out.
 #pragma once
 
 namespace osteon::radiology {
@@ -17,8 +17,8 @@ inline constexpr double kMetal_per_mm = kSteel_per_mm;
 // logarithmic scales, bone has 0.2616 cm²/g and water 0.1937 cm²/g.
 inline constexpr double kCorticalBone_hu = 1593.5;
 
-// μ of a voxel of a scan, 1/mm. Below 0 HU it is a mixture of air, which does not count, and water. Above, it is one of
-// water and cortical bone, because bone weakens the softer rays of a C-arm more than those of a CT scanner.
+// μ of a voxel of a scan, 1/mm. Below 0 HU it is a mixture of air, which does not count, and water. Above, it is one
+// of water and cortical bone, because bone weakens the softer rays of a C-arm more than those of a CT scanner.
 [[nodiscard]] constexpr double attenuation_per_mm(double hu) {
   const double water = kWater_per_mm * (1.0 + hu / 1000.0);
   const double bone = kWater_per_mm + (kCorticalBone_per_mm - kWater_per_mm) * hu / kCorticalBone_hu;

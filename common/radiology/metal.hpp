@@ -21,9 +21,9 @@ inline constexpr double kMetalStep_mm = 0.02;
 // no surface is stepped over.
 [[nodiscard]] double length_in(const Implicit& solid, const Vec3& from_mm, const Vec3& to_mm);
 
-// Sets the pixels of a box to what the solids weaken their rays, ∫ μ dl: a layer of its own beside the radiograph. When
-// a solid moves, the boxes to set again are its shadows (shadow_of()) before and after. The solids displace no bone: a
-// screw's hole is a cut. Where solids overlap, each counts.
+// Sets the pixels of a box to what the solids weaken their rays, ∫ μ dl: a layer of its own beside the radiograph.
+// When a solid moves, the boxes to set again are its shadows (shadow_of()) before and after. The solids displace no
+// bone: a screw's hole is a cut. Where solids overlap, each counts.
 void cast_metal(const ConeBeam& beam, std::span<const MetalSolid> solids, const PixelBox& box, std::span<float> metal);
 
 }  // namespace osteon::radiology

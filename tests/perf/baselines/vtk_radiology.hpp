@@ -11,8 +11,8 @@
 namespace osteon::baselines {
 
 // vtkFixedPointVolumeRayCastMapper: the only mapper of VTK that casts rays through a volume without a graphics card. It
-// composites black matter in front of white, with the opacity of one pitch, so a pixel is 255 exp(−∫ μ dl). Needs a
-// display. VTK looks from the source, and a radiograph is as from the detector, so picture() mirrors the frame.
+// composites black matter in front of white, with the opacity of one pitch, so a pixel is 255 exp(−∫ μ dl). Needs
+// a display. VTK looks from the source, and a radiograph is as from the detector, so picture() mirrors the frame.
 class VtkRadiograph {
  public:
   VtkRadiograph(const radiology::BoneHu& bone, const radiology::ConeBeam& beam);

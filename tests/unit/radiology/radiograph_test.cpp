@@ -301,7 +301,8 @@ std::vector<ConeBeam> beams_of_all_axes() {
   return {small_beam(1.4, 0.1), small_beam(0.2, -0.3), small_beam(0.3, 1.3), wide_beam()};
 }
 
-// ∫ μ dl of a ray, plane by plane, every plane, in 64 bits: Joseph's sum as it is written, without bricks or packets.
+// ∫ μ dl of a ray, plane by plane, every plane, in 64 bits: Joseph's sum as it is written, without bricks or
+// packets.
 double plain_sum(const BoneHu& bone, const Vec3& source_mm, const Vec3& pixel_mm) {
   const double h = bone.pitch_mm();
   const Vec3 from = source_mm / h, d = (pixel_mm - source_mm) / h;
