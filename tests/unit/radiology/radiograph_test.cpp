@@ -378,6 +378,16 @@ TEST(Radiograph, RaysCastAgainEqualAllRays) {
   for (const ConeBeam& beam : beams_of_all_axes()) expect_recast_equals_cast(beam, 60);
 }
 
+// A changed sample reaches several pixels of an eighth of a millimetre.
+TEST(Radiograph, FineRaysCastAgainEqualAllRays) {
+  CArm arm;
+  arm.orbit_rad = 0.5;
+  arm.detector_mm = 30.0;
+  arm.columns = 240;
+  arm.rows = 240;
+  expect_recast_equals_cast(good_beam(arm), 60);
+}
+
 // Of the whole bone, 1/mm · mm³.
 double mass_of(const BoneHu& bone) {
   const CoordBox& box = bone.box();
