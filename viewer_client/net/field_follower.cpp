@@ -131,7 +131,10 @@ Result<void> FieldFollower::take(const v1::CommittedCut& committed) {
     before_mm = tip_mm;
     if (!is_near(tip_mm)) return tl::unexpected(at_fault("committed.cut is far from the bone"));
   }
-  if (way_mm > kLongestWay_mm) return tl::unexpected(at_fault("committed.cut is longer than any"));
+  if (way_mm > kLongestWay_mm)
+    return failure(ErrorCode::exhausted,
+                   "a cut is longer than the 200 mm that this viewer computes; set limits.swept_mm "
+                   "of the server to 200 or less");
   if (RoomSeq{committed.room_seq()} <= bone_.room_seq())
     return tl::unexpected(at_fault("committed.room_seq is not newer than the event before"));
   bone_.commit(RoomSeq{committed.room_seq()}, *cut, false);

@@ -248,7 +248,7 @@ TEST_F(Following, RefusesWhatNoServerSends) {
   EXPECT_EQ(follower_.bone().hash(), before);
 
   // Cuts that would keep the viewer computing for ever.
-  for (const auto& [x, sentence] : {std::pair(1 << 30, "far from the bone"), std::pair(300 << 10, "longer than any")}) {
+  for (const auto& [x, sentence] : {std::pair(1 << 30, "far from the bone"), std::pair(300 << 10, "limits.swept_mm")}) {
     (void)follow();
     v1::WatchFieldResponse cut = messages.at(0);
     cut.mutable_committed()->set_room_seq(room_.status().room_seq.value + 1);
