@@ -59,8 +59,9 @@ class WindowBench : public testing::Test {
   template <class Condition>
   [[nodiscard]] bool push_until(Condition condition) {
     return until([&] {
-      if (!view_->pointer().pushing()) release(middle()), press(middle());
-      return condition();
+      if (condition()) return true;
+      if (view_->isVisible() && !view_->pointer().pushing()) release(middle()), press(middle());
+      return false;
     });
   }
   void trigger(const char* action);
