@@ -1,7 +1,10 @@
 #include "haptic_client/simulation/pointer_session.hpp"
 
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <utility>
 
 namespace osteon::haptic {
@@ -43,11 +46,17 @@ Result<ReadyPlan> make_pointed_hand(const FreeHandOptions& first, const Case& bo
   };
   Result<ReadyPlan> ready = make_free_hand(first, bone, find);
   if (!ready) return ready;
-  for (const Tool& tool : tools) {
-    if (tool.name == first.tool || !check_held(tool)) continue;
-    Result<ToolModel> model = ToolModel::make(tool, bone.pitch_mm(), 1.0, "");
+  // The points of a tool take up to 0.2 s, and a person waits for those of all tools.
+  std::vector<std::optional<Result<ToolModel>>> models(tools.size());
+  tbb::parallel_for(std::size_t{0}, tools.size(), [&](std::size_t i) {
+    if (tools[i].name != first.tool && check_held(tools[i]))
+      models[i].emplace(ToolModel::make(tools[i], bone.pitch_mm(), 1.0, ""));
+  });
+  for (std::size_t i = 0; i < tools.size(); ++i) {
+    if (!models[i]) continue;
+    Result<ToolModel>& model = *models[i];
     if (!model) return tl::unexpected(model.error());
-    model->spindle.full_rpm = std::max(1.0, tool.spindle_rpm);
+    model->spindle.full_rpm = std::max(1.0, tools[i].spindle_rpm);
     ready->tools.push_back(std::move(*model));
   }
   return ready;
