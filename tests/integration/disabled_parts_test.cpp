@@ -61,7 +61,7 @@ TEST_F(DisabledParts, SayWhyInTheirToolTips) {
   EXPECT_EQ(tip_at(*panel, QPoint(20, 8)), kNoRoom) << "its title";
   EXPECT_EQ(tip_at(*window_->findChild<QLabel*>("force_bone"), QPoint(2, 2)), kNoRoom) << "a part of another panel";
   static_cast<QMenu*>(edit)->popup(window_->mapToGlobal(QPoint(200, 200)));
-  ASSERT_TRUE(QTest::qWaitForWindowExposed(edit));
+  ASSERT_TRUE(QTest::qWaitForWindowExposed(edit, 30000));
   EXPECT_EQ(tip_at(*edit, static_cast<QMenu*>(edit)->actionGeometry(static_cast<QMenu*>(edit)->actions()[0]).center()),
             kNoRoom);
   edit->close();
@@ -160,7 +160,7 @@ TEST_F(DisabledParts, TheSoundDialogSaysWhyTheVolumeCannotBeSet) {
   };
   auto* dialog = open_dialog();
   ASSERT_NE(dialog, nullptr);
-  ASSERT_TRUE(QTest::qWaitForWindowExposed(dialog));
+  ASSERT_TRUE(QTest::qWaitForWindowExposed(dialog, 30000));
   auto* volume = dialog->findChild<QSlider*>("volume");
   EXPECT_TRUE(volume->isEnabled());
   EXPECT_TRUE(volume->toolTip().isEmpty());
@@ -186,7 +186,7 @@ TEST_F(DisabledParts, TheSoundDialogSaysWhatPlaysARoomOfOthers) {
   const std::string says = "The window plays only the rooms that it opened. To hear this one, start: osteon-audio ";
   trigger("sound_settings");
   auto* dialog = window_->findChild<SoundDialog*>("sound_dialog");
-  ASSERT_TRUE(QTest::qWaitForWindowExposed(dialog));
+  ASSERT_TRUE(QTest::qWaitForWindowExposed(dialog, 30000));
   window_->join({"127.0.0.1:1", "Ada's knee", {}, {}});
   EXPECT_EQ(label("sound_trouble").toStdString(), says + "--server 127.0.0.1:1 --room 'Ada'\\''s knee' --plain");
   window_->join({"127.0.0.1:1", "", {}, {"/home/ben/mine", "/home/ben/a ticket"}});

@@ -40,7 +40,7 @@ TEST(ScrollingPlot, LevelLinesAreNotDrawnAgainAndAgain) {
   ScrollingPlot plot;
   plot.installEventFilter(&counter);
   plot.show();
-  ASSERT_TRUE(QTest::qWaitForWindowExposed(&plot));
+  ASSERT_TRUE(QTest::qWaitForWindowExposed(&plot, 30000));
   double at_s = 0.0;
   const auto paints_of = [&](double force_n, int count) {
     const int before = counter.paints;
@@ -149,7 +149,7 @@ TEST(RiskGauge, ItsToolTipGoesOnWhileItIsRead) {
   window.resize(300, 100);
   gauge.show_tools(std::vector{tool_at("drill-3.2", 40.0, "")});
   window.show();
-  ASSERT_TRUE(QTest::qWaitForWindowExposed(&window));
+  ASSERT_TRUE(QTest::qWaitForWindowExposed(&window, 30000));
   // The screen's own pointer: an event alone would not put the label under it.
   QCursor::setPos(gauge.mapToGlobal(QPoint(50, 50)));
   ASSERT_TRUE(QTest::qWaitFor([&] { return gauge.underMouse(); }, 10000));

@@ -241,7 +241,7 @@ class LanguageTest : public testing::Test {
     speak(language);
     window_ = std::make_unique<MainWindow>();
     window_->show();
-    ASSERT_TRUE(QTest::qWaitForWindowExposed(window_.get()));
+    ASSERT_TRUE(QTest::qWaitForWindowExposed(window_.get(), 30000));
     QTest::qWait(100);
   }
   void open_bone() {
@@ -451,7 +451,7 @@ TEST_F(LanguageTest, TextsWithoutRoomAreNoticed) {
   const std::vector<QWidget*> widgets{label, wrapped, button, combo, spin, list, tabs, group, status, bar};
   for (QWidget* widget : widgets) widget->resize(390, 60);
   window.show();
-  ASSERT_TRUE(QTest::qWaitForWindowExposed(&window));
+  ASSERT_TRUE(QTest::qWaitForWindowExposed(&window, 30000));
   for (QWidget* widget : widgets) {
     widget->resize(390, 60);
     EXPECT_THAT(clipped(window), IsEmpty());
