@@ -350,6 +350,7 @@ void MainWindow::enter_room(const RoomAddress& room) {
   options.credentials = room.credentials;
   if (!room.name.isEmpty()) options.name = room.name.toStdString();
   options.keep_trying = true;
+  options.cache = data_folder() / "cache";  // that of the haptic client too
   options.first_look = [width = std::max(1, view_->width()), height = std::max(1, view_->height())](const Box& bone) {
     return look_of(overview(bone), width, height);
   };
@@ -377,6 +378,7 @@ void MainWindow::show_joined(const WatchedRoom& room) {
   start_->end_work({});
   view_->show_room(&room_->queue(), room.bounds);
   clipping_->reset(room.bounds);
+  inside_.set_room(room_.get(), opened_ ? opened_->bone : std::filesystem::path());
   view_options_->show_bone(QString::fromStdString(room.case_title));
   view_->set_notice({});
   view_->arrived();
@@ -413,6 +415,7 @@ void MainWindow::leave_room() {
   undo_points_.clear();
   view_->show_room(nullptr, {});
   risk_->set_plan(nullptr);
+  inside_.set_room(nullptr);
   room_.reset();
   practice_.reset();
   pointer_.reset();
