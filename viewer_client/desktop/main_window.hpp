@@ -33,6 +33,7 @@ class GamePadController;
 class PropertiesPanel;
 class SoundControl;
 class RiskGauge;
+class SlicesPanel;
 class StartPage;
 class SurgeryToolBar;
 class Tour;
@@ -147,6 +148,7 @@ class MainWindow : public QMainWindow {
   GaugesPanel* gauges_ = nullptr;
   PropertiesPanel* properties_ = nullptr;
   ClippingPanel* clipping_ = nullptr;
+  SlicesPanel* slices_ = nullptr;
   ViewOptions* view_options_ = nullptr;
   SoundControl* sound_control_ = nullptr;
   Tour* tour_ = nullptr;
