@@ -98,7 +98,6 @@ void SlicesPanel::add_choices(QBoxLayout& all) {
   row->addStretch();
   hu_ = new QLabel;
   hu_->setObjectName("slice_hu");
-  hu_->setAccessibleName(tr("HU under the pointer"));
   row->addWidget(hu_);
   all.addLayout(row);
 }

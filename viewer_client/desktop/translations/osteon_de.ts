@@ -1260,24 +1260,20 @@
         <translation>Das Kreuz in der Mitte des Knochens, und der ganze Knochen in den Bildern.</translation>
     </message>
     <message>
-        <source>HU under the pointer</source>
-        <translation>HU unter dem Zeiger</translation>
-    </message>
-    <message>
         <source>Left button: the cross. Right: the window. Middle: moves the image. Wheel or Page Up and Page Down: the next slice. Ctrl and wheel, or + and -: nearer or farther. Arrows: the cross.</source>
         <translation>Linke Taste: das Kreuz. Rechte: das Fenster. Mittlere: verschiebt das Bild. Rad oder Bild auf und Bild ab: der nächste Schnitt. Strg und Rad, oder + und -: näher oder ferner. Pfeile: das Kreuz.</translation>
     </message>
     <message>
         <source>Axial</source>
-        <translation>Axial</translation>
+        <translation>Axialer Schnitt</translation>
     </message>
     <message>
         <source>Coronal</source>
-        <translation>Koronal</translation>
+        <translation>Koronaler Schnitt</translation>
     </message>
     <message>
         <source>Sagittal</source>
-        <translation>Sagittal</translation>
+        <translation>Sagittaler Schnitt</translation>
     </message>
     <message>
         <source>Along, turned by 90°</source>
@@ -1289,7 +1285,7 @@
     </message>
     <message>
         <source>Slice: %1</source>
-        <translation>Schnitt: %1</translation>
+        <translation>Regler: %1</translation>
     </message>
     <message>
         <source>%1 HU at %2, %3, %4 mm</source>
