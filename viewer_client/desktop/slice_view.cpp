@@ -151,8 +151,8 @@ void SliceView::paint_lines(QPainter& painter) const {
   painter.setPen(line_colours_[1]);
   painter.drawLine(QPointF(cross.x(), 0), QPointF(cross.x(), cross.y() - kGap_px));
   painter.drawLine(QPointF(cross.x(), cross.y() + kGap_px), QPointF(cross.x(), height()));
-  if (!overlay_.tool) return;
-  if (const auto axis = project(image_->plane, overlay_.tip_mm, overlay_.axis)) {
+  if (!overlay_.tool_axis) return;
+  if (const auto axis = project(image_->plane, overlay_.tool_axis->point_mm, overlay_.tool_axis->direction)) {
     painter.setPen(QPen(QColor(kToolColour), 1.0, Qt::DotLine));
     painter.drawLine(to_widget(axis->from), to_widget(axis->to));
   }

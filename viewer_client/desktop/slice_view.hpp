@@ -18,8 +18,11 @@ namespace osteon {
 // What is drawn over the images, in the bone's frame.
 struct SliceOverlay {
   Vec3 point_mm = Vec3::Zero();  // of the cross
-  std::optional<Implicit> tool;  // its solid, where it is now
-  Vec3 tip_mm = Vec3::Zero(), axis = Vec3::UnitZ();
+  struct Axis {
+    Vec3 point_mm, direction;
+  };
+  std::optional<Axis> tool_axis;  // none: no hand holds a tool
+  std::optional<Implicit> tool;   // its solid, where it is now; none: not a built-in tool
   struct Planned {
     QString name;
     Vec3 point_mm, direction;

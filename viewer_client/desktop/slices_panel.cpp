@@ -9,6 +9,7 @@
 #include <QResizeEvent>
 #include <QSettings>
 #include <QSlider>
+#include <QStringList>
 #include <QVBoxLayout>
 #include <algorithm>
 #include <cmath>
@@ -84,9 +85,7 @@ void SlicesPanel::add_choices(QBoxLayout& all) {
   presets_->addItem(tr("Soft tissue"));
   presets_->addItem(tr("Wide"));
   presets_->addItem(tr("By hand"));
-  presets_->setToolTip(
-      tr("Which HU are black and white. A drag with the right button changes it: to the right wider, "
-         "down darker."));
+  presets_->setToolTip(tr("Which HU are black and white. Drag with the right button to change it."));
   connect(presets_, QOverload<int>::of(&QComboBox::activated), this, [this] { choose_window(); });
   auto* whole = new QPushButton(tr("Whole bone"));
   whole->setObjectName("slices_whole");
@@ -118,9 +117,11 @@ void SlicesPanel::add_views(QBoxLayout& all) {
     events.resized = [this] { ask(); };
     views_[i] = new SliceView(std::move(events));
     views_[i]->setObjectName(kViewNames[i]);
-    views_[i]->setToolTip(
-        tr("Left button: the cross. Right: the window. Middle: moves the image. Wheel or Page Up and Page Down: the "
-           "next slice. Ctrl and wheel, or + and -: nearer or farther. Arrows: the cross."));
+    views_[i]->setToolTip(QStringList{tr("Left button or arrows: the cross. Middle button: the image moves."),
+                                      tr("Right button: to the right a wider window of HU, down a darker image."),
+                                      tr("Wheel, or Page Up and Page Down: the next slice."),
+                                      tr("Ctrl and wheel, or + and -: nearer or farther.")}
+                              .join('\n'));
     sliders_[i] = new QSlider(Qt::Vertical);
     sliders_[i]->setObjectName(kSliderNames[i]);
     connect(sliders_[i], &QSlider::valueChanged, this, [this, i](int value) {
@@ -292,6 +293,7 @@ void SlicesPanel::follow(const CuttingState* tool) {
   if (tool == nullptr) {
     if (!tool_pose_) return;
     tool_pose_.reset();
+    overlay_.tool_axis.reset();
     overlay_.tool.reset();
     for (SliceView* view : views_) view->show_overlay(overlay_);
     return;
@@ -312,8 +314,7 @@ void SlicesPanel::set_tool(const CuttingState* tool) {
     solid_ = known ? std::optional(tool_solid(*known)) : std::nullopt;
   }
   tool_pose_ = tool->pose_bone_tool;
-  overlay_.tip_mm = tool_pose_->position_mm;
-  overlay_.axis = tool_pose_->direction(Vec3::UnitZ());
+  overlay_.tool_axis = {tool_pose_->position_mm, tool_pose_->direction(Vec3::UnitZ())};
   overlay_.tool = solid_ ? std::optional(placed(*solid_, *tool_pose_)) : std::nullopt;
   for (SliceView* view : views_) view->show_overlay(overlay_);
 }

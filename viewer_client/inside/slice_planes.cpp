@@ -72,7 +72,7 @@ class Outline {
   std::vector<OutlinePart> parts_;
 };
 
-// The part of a line from `at` along `way` whose parameter is in both ranges of the image (Liang and Barsky 1984).
+// The part of a line from `at` along `way` that is in the image.
 std::optional<std::pair<double, double>> clipped(const Pixel& at, const Pixel& way, const Pixel& last) {
   double from = -1e9, to = 1e9;
   for (Eigen::Index axis = 0; axis < 2; ++axis) {

@@ -1248,20 +1248,12 @@
         <translation>Von Hand</translation>
     </message>
     <message>
-        <source>Which HU are black and white. A drag with the right button changes it: to the right wider, down darker.</source>
-        <translation>Welche HU schwarz und weiß sind. Ziehen mit der rechten Taste ändert es: nach rechts weiter, nach unten dunkler.</translation>
-    </message>
-    <message>
         <source>Whole bone</source>
         <translation>Ganzer Knochen</translation>
     </message>
     <message>
         <source>The cross in the middle of the bone, and all of it in the images.</source>
         <translation>Das Kreuz in der Mitte des Knochens, und der ganze Knochen in den Bildern.</translation>
-    </message>
-    <message>
-        <source>Left button: the cross. Right: the window. Middle: moves the image. Wheel or Page Up and Page Down: the next slice. Ctrl and wheel, or + and -: nearer or farther. Arrows: the cross.</source>
-        <translation>Linke Taste: das Kreuz. Rechte: das Fenster. Mittlere: verschiebt das Bild. Rad oder Bild auf und Bild ab: der nächste Schnitt. Strg und Rad, oder + und -: näher oder ferner. Pfeile: das Kreuz.</translation>
     </message>
     <message>
         <source>Axial</source>
@@ -1306,6 +1298,26 @@
     <message>
         <source>The slices show the density of the case, not its scan: %1</source>
         <translation>Die Schnittbilder zeigen die Dichte des Falls, nicht seinen Scan: %1</translation>
+    </message>
+    <message>
+        <source>Which HU are black and white. Drag with the right button to change it.</source>
+        <translation>Welche HU schwarz und weiß sind. Ziehen mit der rechten Taste ändert es.</translation>
+    </message>
+    <message>
+        <source>Left button or arrows: the cross. Middle button: the image moves.</source>
+        <translation>Linke Taste oder Pfeile: das Kreuz. Mittlere Taste: das Bild wandert.</translation>
+    </message>
+    <message>
+        <source>Right button: to the right a wider window of HU, down a darker image.</source>
+        <translation>Rechte Taste: nach rechts ein weiteres Fenster der HU, nach unten ein dunkleres Bild.</translation>
+    </message>
+    <message>
+        <source>Wheel, or Page Up and Page Down: the next slice.</source>
+        <translation>Rad, oder Bild auf und Bild ab: der nächste Schnitt.</translation>
+    </message>
+    <message>
+        <source>Ctrl and wheel, or + and -: nearer or farther.</source>
+        <translation>Strg und Rad, oder + und -: näher oder ferner.</translation>
     </message>
 </context>
 <context>
