@@ -50,7 +50,7 @@ HAPTIC_LAYERS = {
     "app": {"net", "device", "contact", "prediction", "rendering", "simulation"},
 }
 # Inside a client: which folders (and tests) may include this one.
-OUTER = {"app": set(), "desktop": set(), "net": {"app", "desktop"}}
+OUTER = {"app": set(), "desktop": set(), "inside": {"desktop"}, "net": {"app", "desktop", "inside"}}
 
 # Headers that are slow to compile or impose a library's conventions. They must stay out of headers, and within the
 # folders named here.

@@ -323,7 +323,7 @@ TEST_F(LanguageTest, TheSurgeryViewIsWholeInBothLanguages) {
   EXPECT_THAT(untranslated(seen["en"], seen["de"]), IsEmpty());
 }
 
-TEST_F(LanguageTest, TourSoundAndConnectionsAreWholeInBothLanguages) {
+TEST_F(LanguageTest, TourSoundAndPanelsAreWholeInBothLanguages) {
   std::map<std::string, std::set<QString>> seen;
   for (const char* language : {"en", "de"}) {
     open_window(language);
@@ -336,7 +336,7 @@ TEST_F(LanguageTest, TourSoundAndConnectionsAreWholeInBothLanguages) {
     }
     open_bone();
     if (HasFatalFailure()) return;
-    window_->findChild<QAction*>("connections")->trigger();
+    for (const char* panel : {"connections", "slices"}) window_->findChild<QAction*>(panel)->trigger();
     window_->findChild<QAction*>("sound_settings")->trigger();
     const auto* dialog = window_->findChild<QWidget*>("sound_dialog");
     ASSERT_NE(dialog, nullptr);
@@ -345,7 +345,7 @@ TEST_F(LanguageTest, TourSoundAndConnectionsAreWholeInBothLanguages) {
     EXPECT_THAT(clipped(*dialog), IsEmpty()) << language;
     EXPECT_THAT(nameless(*dialog), IsEmpty()) << language;
     seen[language].merge(texts(*window_));
-    window_->findChild<QAction*>("connections")->trigger();
+    for (const char* panel : {"connections", "slices"}) window_->findChild<QAction*>(panel)->trigger();
   }
   EXPECT_THAT(untranslated(seen["en"], seen["de"]), IsEmpty());
 }

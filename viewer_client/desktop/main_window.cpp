@@ -42,6 +42,7 @@
 #include "viewer_client/desktop/gauges_panel.hpp"
 #include "viewer_client/desktop/properties_panel.hpp"
 #include "viewer_client/desktop/risk_gauge.hpp"
+#include "viewer_client/desktop/slices_panel.hpp"
 #include "viewer_client/desktop/sound_control.hpp"
 #include "viewer_client/desktop/start_page.hpp"
 #include "viewer_client/desktop/tool_bar.hpp"
@@ -165,10 +166,13 @@ void MainWindow::make_panels() {
   QDockWidget* clipping = dock(tr("Clipping"), "clipping_panel", clipping_, Qt::RightDockWidgetArea);
   QDockWidget* connections = dock(tr("Connections"), "connection_panel",
                                   new ConnectionPanel([this] { return this->connections(); }), Qt::RightDockWidgetArea);
+  slices_ = new SlicesPanel(inside_);
+  QDockWidget* slices = dock(tr("Slices"), "slices_panel", slices_, Qt::BottomDockWidgetArea);
+  setCorner(Qt::BottomRightCorner, Qt::RightDockWidgetArea);  // the gauges keep their height
   // One above the other, four panels would show little of each. Three tabs beside each other would cut their titles.
   tabifyDockWidget(tool, clipping);
   tabifyDockWidget(gauges, connections);
-  for (QDockWidget* panel : {clipping, connections}) {
+  for (QDockWidget* panel : {clipping, connections, slices}) {
     panel->hide();
     connect(panel->toggleViewAction(), &QAction::triggered, panel, [panel](bool on) {
       if (on) panel->raise();
@@ -176,6 +180,8 @@ void MainWindow::make_panels() {
   }
   connections->toggleViewAction()->setObjectName("connections");
   connections->toggleViewAction()->setShortcut(QKeySequence("Ctrl+Shift+N"));
+  slices->toggleViewAction()->setObjectName("slices");
+  slices->toggleViewAction()->setShortcut(QKeySequence("Ctrl+Shift+L"));
 }
 
 void MainWindow::make_status() {
@@ -350,6 +356,7 @@ void MainWindow::enter_room(const RoomAddress& room) {
   options.credentials = room.credentials;
   if (!room.name.isEmpty()) options.name = room.name.toStdString();
   options.keep_trying = true;
+  options.cache = data_folder() / "cache";  // that of the haptic client too
   options.first_look = [width = std::max(1, view_->width()), height = std::max(1, view_->height())](const Box& bone) {
     return look_of(overview(bone), width, height);
   };
@@ -377,6 +384,8 @@ void MainWindow::show_joined(const WatchedRoom& room) {
   start_->end_work({});
   view_->show_room(&room_->queue(), room.bounds);
   clipping_->reset(room.bounds);
+  slices_->reset(room.bounds, room.pitch_mm);
+  inside_.set_room(room_.get(), opened_ ? opened_->bone : std::filesystem::path());
   view_options_->show_bone(QString::fromStdString(room.case_title));
   view_->set_notice({});
   view_->arrived();
@@ -413,7 +422,9 @@ void MainWindow::leave_room() {
   undo_points_.clear();
   view_->show_room(nullptr, {});
   risk_->set_plan(nullptr);
+  inside_.set_room(nullptr);
   room_.reset();
+  slices_->reset({}, 1.0);
   practice_.reset();
   pointer_.reset();
   sound_control_->close();
@@ -624,9 +635,8 @@ void MainWindow::refresh_gauges() {
   // The tip of the own tool, also where another one is nearer to a structure. Who has no hand sees that of the only
   // tool.
   const auto tip = std::ranges::find_if(tools, &HeldTool::own);
-  if (const HeldTool* shown = tip != tools.end()                    ? &*tip
-                              : own == nullptr && tools.size() == 1 ? &tools.front()
-                                                                    : nullptr) {
+  const HeldTool* shown = tip != tools.end() ? &*tip : own == nullptr && tools.size() == 1 ? &tools.front() : nullptr;
+  if (shown != nullptr) {
     const Vec3& at = shown->state.pose_bone_tool.position_mm;
     position_->setText(tr("Tip %1, %2, %3 mm")
                            .arg(QLocale().toString(at.x(), 'f', 1), QLocale().toString(at.y(), 'f', 1),
@@ -636,6 +646,8 @@ void MainWindow::refresh_gauges() {
   }
   risk_->set_plan(updater != nullptr ? updater->plan() : nullptr);
   risk_->show_tools(tools);
+  const bool planned = updater != nullptr && findChild<QAction*>("planned")->isChecked();
+  slices_->refresh(shown != nullptr ? &shown->state : nullptr, planned ? updater->plan().get() : nullptr);
   if (const QString fault = QString::fromStdString(view_->take_plan_fault()); !fault.isEmpty()) say(fault);
   if (pointer_)
     device_->setText(!pointer_->connected() ? tr("The pointer's device is away")

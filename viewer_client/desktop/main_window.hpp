@@ -12,6 +12,7 @@
 #include "common/input/pointer_link.hpp"
 #include "common/input/space_mouse.hpp"
 #include "common/wire/credentials.hpp"
+#include "viewer_client/desktop/inside_link.hpp"
 #include "viewer_client/desktop/library.hpp"
 #include "viewer_client/desktop/practice_room.hpp"
 #include "viewer_client/desktop/room_link.hpp"
@@ -32,6 +33,7 @@ class GamePadController;
 class PropertiesPanel;
 class SoundControl;
 class RiskGauge;
+class SlicesPanel;
 class StartPage;
 class SurgeryToolBar;
 class Tour;
@@ -146,6 +148,7 @@ class MainWindow : public QMainWindow {
   GaugesPanel* gauges_ = nullptr;
   PropertiesPanel* properties_ = nullptr;
   ClippingPanel* clipping_ = nullptr;
+  SlicesPanel* slices_ = nullptr;
   ViewOptions* view_options_ = nullptr;
   SoundControl* sound_control_ = nullptr;
   Tour* tour_ = nullptr;
@@ -161,6 +164,7 @@ class MainWindow : public QMainWindow {
   std::filesystem::path made_anew_;  // the case that make_anew() got last; empty: a room has opened since
   std::unique_ptr<PointerServer> pointer_;
   std::unique_ptr<PracticeRoom> practice_;
+  InsideLink inside_;
   std::unique_ptr<RoomLink> room_;
   std::optional<RecentEntry> opened_;
   std::vector<RoomSeq> undo_points_;  // before each push and each item, oldest first

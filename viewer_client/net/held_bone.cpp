@@ -203,4 +203,9 @@ bool HeldBone::wait(const std::function<bool(const HeldBoneStatus&)>& done, std:
                                  [&]() OSTEON_REQUIRES(impl_->status_mutex) { return done(impl_->status); });
 }
 
+void HeldBone::wake_waiting() const {
+  const MutexLock lock(impl_->status_mutex);  // for who is about to wait
+  impl_->changed.notify_all();
+}
+
 }  // namespace osteon

@@ -72,6 +72,8 @@ class HeldBone {
   [[nodiscard]] FieldChanges take_changes();
   // Waits until `done`, which may take no lock. False: it was not within `patience`.
   bool wait(const std::function<bool(const HeldBoneStatus&)>& done, std::chrono::milliseconds patience) const;
+  // Whoever waits asks `done` again: what it looks at has changed.
+  void wake_waiting() const;
 
  private:
   struct Impl;

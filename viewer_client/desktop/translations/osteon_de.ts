@@ -981,6 +981,10 @@
         <source>A click places this tool. It has neither wear nor force law.</source>
         <translation>Ein Klick setzt dieses Werkzeug. Es hat weder Verschleiß noch Kraftgesetz.</translation>
     </message>
+    <message>
+        <source>Slices</source>
+        <translation>Schnittbilder</translation>
+    </message>
 </context>
 <context>
     <name>PracticeRoom</name>
@@ -1188,6 +1192,132 @@
     <message>
         <source>%1 N</source>
         <translation>%1 N</translation>
+    </message>
+</context>
+<context>
+    <name>SliceView</name>
+    <message>
+        <source>%1 mm</source>
+        <translation>%1 mm</translation>
+    </message>
+</context>
+<context>
+    <name>SlicesPanel</name>
+    <message>
+        <source>Planes of the slices</source>
+        <translation>Ebenen der Schnittbilder</translation>
+    </message>
+    <message>
+        <source>Patient&apos;s axes</source>
+        <translation>Achsen des Patienten</translation>
+    </message>
+    <message>
+        <source>Along the tool</source>
+        <translation>Entlang des Werkzeugs</translation>
+    </message>
+    <message>
+        <source>Axial, coronal and sagittal, or along the tool and across its tip.</source>
+        <translation>Axial, koronal und sagittal, oder entlang des Werkzeugs und quer an seiner Spitze.</translation>
+    </message>
+    <message>
+        <source>Follow the tool</source>
+        <translation>Dem Werkzeug folgen</translation>
+    </message>
+    <message>
+        <source>While the tool cuts, the slices go through its tip.</source>
+        <translation>Während das Werkzeug schneidet, gehen die Schnittbilder durch seine Spitze.</translation>
+    </message>
+    <message>
+        <source>Window of the slices</source>
+        <translation>Fenster der Schnittbilder</translation>
+    </message>
+    <message>
+        <source>Bone</source>
+        <translation>Knochen</translation>
+    </message>
+    <message>
+        <source>Soft tissue</source>
+        <translation>Weichteile</translation>
+    </message>
+    <message>
+        <source>Wide</source>
+        <translation>Weit</translation>
+    </message>
+    <message>
+        <source>By hand</source>
+        <translation>Von Hand</translation>
+    </message>
+    <message>
+        <source>Whole bone</source>
+        <translation>Ganzer Knochen</translation>
+    </message>
+    <message>
+        <source>The cross in the middle of the bone, and all of it in the images.</source>
+        <translation>Das Kreuz in der Mitte des Knochens, und der ganze Knochen in den Bildern.</translation>
+    </message>
+    <message>
+        <source>Axial</source>
+        <translation>Axialer Schnitt</translation>
+    </message>
+    <message>
+        <source>Coronal</source>
+        <translation>Koronaler Schnitt</translation>
+    </message>
+    <message>
+        <source>Sagittal</source>
+        <translation>Sagittaler Schnitt</translation>
+    </message>
+    <message>
+        <source>Along, turned by 90°</source>
+        <translation>Entlang, um 90° gedreht</translation>
+    </message>
+    <message>
+        <source>Across the tip</source>
+        <translation>Quer an der Spitze</translation>
+    </message>
+    <message>
+        <source>Slice: %1</source>
+        <translation>Regler: %1</translation>
+    </message>
+    <message>
+        <source>%1 HU at %2, %3, %4 mm</source>
+        <translation>%1 HU bei %2, %3, %4 mm</translation>
+    </message>
+    <message>
+        <source>The bone is fetched…</source>
+        <translation>Der Knochen wird geholt…</translation>
+    </message>
+    <message>
+        <source>The slices are computed, %1 %</source>
+        <translation>Die Schnittbilder werden berechnet, %1 %</translation>
+    </message>
+    <message>
+        <source>Connection lost: the slices show the bone as it was.</source>
+        <translation>Verbindung verloren: Die Schnittbilder zeigen den Knochen, wie er war.</translation>
+    </message>
+    <message>
+        <source>The slices show the density of the case, not its scan: %1</source>
+        <translation>Die Schnittbilder zeigen die Dichte des Falls, nicht seinen Scan: %1</translation>
+    </message>
+    <message>
+        <source>Which HU are black and white. Drag with the right button to change it.</source>
+        <translation>Welche HU schwarz und weiß sind. Ziehen mit der rechten Taste ändert es.</translation>
+    </message>
+    <message>
+        <source>Left button or arrows: the cross. Middle button: the image moves.</source>
+        <translation>Linke Taste oder Pfeile: das Kreuz. Mittlere Taste: das Bild wandert.</translation>
+    </message>
+    <message>
+        <source>Right button: to the right a wider window of HU, down a darker image.</source>
+        <translation>Rechte Taste: nach rechts ein weiteres Fenster der HU, nach unten ein dunkleres Bild.</translation>
+    </message>
+    <message>
+        <source>Wheel, or Page Up and Page Down: the next slice.</source>
+        <translation>Rad, oder Bild auf und Bild ab: der nächste Schnitt.</translation>
+    </message>
+    <message>
+        <source>Ctrl and wheel, or + and -: nearer or farther.</source>
+        <translation>Strg und Rad, oder + und -: näher oder ferner.</translation>
     </message>
 </context>
 <context>

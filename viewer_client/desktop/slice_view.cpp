@@ -1,0 +1,260 @@
+#include "viewer_client/desktop/slice_view.hpp"
+
+#include <QKeyEvent>
+#include <QLocale>
+#include <QMouseEvent>
+#include <QPainter>
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace osteon {
+
+namespace {
+
+constexpr double kNotchOfWheel = 120.0, kZoomOfNotch = 0.85;
+constexpr double kGap_px = 6.0;  // of the cross round its middle, so that the tip is seen
+constexpr int kMargin_px = 4;
+constexpr QRgb kToolColour = 0xfff0e442, kPlannedColour = 0xff56b4e9;
+
+// White letters are read on bone too.
+void write(QPainter& painter, const QRect& where, int flags, const QString& text, const QColor& colour = Qt::white) {
+  painter.setPen(Qt::black);
+  for (const QPoint& by : {QPoint(1, 0), QPoint(-1, 0), QPoint(0, 1), QPoint(0, -1)})
+    painter.drawText(where.translated(by), flags, text);
+  painter.setPen(colour);
+  painter.drawText(where, flags, text);
+}
+
+// The middle of the pixel of the screen under the pointer.
+QPointF place_under(const QMouseEvent& event) { return event.localPos() + QPointF(0.5, 0.5); }
+
+QString letters(const Vec3& direction) { return QString::fromStdString(patient_letters(direction)); }
+
+}  // namespace
+
+SliceView::SliceView(Events events, QWidget* parent) : QWidget(parent), events_(std::move(events)) {
+  setFocusPolicy(Qt::StrongFocus);
+  setMouseTracking(true);
+  setCursor(Qt::CrossCursor);
+  setSizePolicy(QSizePolicy::Expanding, QSizePolicy::Expanding);
+  setContextMenuPolicy(Qt::PreventContextMenu);  // the right button sets the window
+  setAttribute(Qt::WA_OpaquePaintEvent);
+}
+
+void SliceView::set_title(const QString& title, const QColor& colour, const std::array<QColor, 2>& line_colours) {
+  title_ = title;
+  colour_ = colour;
+  line_colours_ = line_colours;
+  setAccessibleName(title);
+  update();
+}
+
+void SliceView::show_image(std::shared_ptr<const SliceImage> image, const HuWindow& window) {
+  if (image == image_ && window == window_) return;
+  image_ = std::move(image);
+  window_ = window;
+  if (!image_) {
+    grey_ = {};
+  } else {
+    const radiology::PixelGrid& plane = image_->plane;
+    if (grey_.width() != plane.columns || grey_.height() != plane.rows)
+      grey_ = QImage(plane.columns, plane.rows, QImage::Format_Grayscale8);
+    const auto columns = static_cast<std::size_t>(plane.columns);
+    for (int row = 0; row < plane.rows; ++row)  // each line of the picture begins at a multiple of four bytes
+      grey_of(std::span(image_->hu).subspan(plane.index(0, row), columns), window_, {grey_.scanLine(row), columns});
+  }
+  refresh_overlay();
+}
+
+void SliceView::show_overlay(const SliceOverlay& overlay) {
+  overlay_ = overlay;
+  refresh_overlay();
+}
+
+void SliceView::refresh_overlay() {
+  outline_.clear();
+  if (image_ && overlay_.tool) outline_ = outline_in(image_->plane, *overlay_.tool);
+  update();
+}
+
+void SliceView::set_notice(const QString& notice) {
+  if (notice == notice_) return;
+  notice_ = notice;
+  update();
+}
+
+ImageSize SliceView::size_px() const {
+  const double ratio = devicePixelRatioF();
+  return {std::max(1, static_cast<int>(std::lround(width() * ratio))),
+          std::max(1, static_cast<int>(std::lround(height() * ratio)))};
+}
+
+QPointF SliceView::to_widget(const Pixel& pixel) const {
+  const double ratio = devicePixelRatioF();
+  return {0.5 * width() + (pixel.x() - 0.5 * (image_->plane.columns - 1)) / ratio,
+          0.5 * height() + (pixel.y() - 0.5 * (image_->plane.rows - 1)) / ratio};
+}
+
+Pixel SliceView::to_image(const QPointF& place) const {
+  const double ratio = devicePixelRatioF();
+  return {(place.x() - 0.5 * width()) * ratio + 0.5 * (image_->plane.columns - 1),
+          (place.y() - 0.5 * height()) * ratio + 0.5 * (image_->plane.rows - 1)};
+}
+
+QPointF SliceView::place_of(const Vec3& point_mm) const {
+  return image_ ? to_widget(pixel_at(image_->plane, point_mm)) : QPointF();
+}
+
+Vec3 SliceView::point_at(const QPointF& place) const {
+  if (!image_) return Vec3::Zero();
+  const Pixel pixel = to_image(place);
+  return image_->plane.at(pixel.x(), pixel.y());
+}
+
+std::optional<double> SliceView::hu_at(const Vec3& point_mm) const {
+  if (!image_) return {};
+  const Pixel at = pixel_at(image_->plane, point_mm);
+  const double column = std::round(at.x()), row = std::round(at.y());
+  if (!(column >= 0.0 && row >= 0.0 && column < image_->plane.columns && row < image_->plane.rows)) return {};
+  return static_cast<double>(image_->hu[image_->plane.index(static_cast<int>(column), static_cast<int>(row))]);
+}
+
+void SliceView::paintEvent(QPaintEvent*) {
+  QPainter painter(this);
+  painter.fillRect(rect(), Qt::black);
+  if (!image_) {
+    painter.setPen(Qt::white);
+    painter.drawText(rect().adjusted(kMargin_px, kMargin_px, -kMargin_px, -kMargin_px),
+                     Qt::AlignCenter | Qt::TextWordWrap, notice_);
+  } else {
+    const double ratio = devicePixelRatioF();
+    const QPointF corner = to_widget(Pixel(-0.5, -0.5));
+    painter.drawImage(QRectF(corner, QSizeF(grey_.width() / ratio, grey_.height() / ratio)), grey_);
+    painter.setRenderHint(QPainter::Antialiasing);
+    paint_lines(painter);
+    paint_planned(painter);
+    painter.setPen(QPen(QColor(kToolColour), 1.5));
+    for (const OutlinePart& part : outline_) painter.drawLine(to_widget(part.from), to_widget(part.to));
+    paint_words(painter);
+  }
+  painter.setRenderHint(QPainter::Antialiasing, false);
+  painter.setPen(QPen(colour_, hasFocus() ? 3 : 1));
+  painter.drawRect(rect().adjusted(0, 0, -1, -1));
+}
+
+void SliceView::paint_lines(QPainter& painter) const {
+  const QPointF cross = place_of(overlay_.point_mm);
+  painter.setPen(line_colours_[0]);
+  painter.drawLine(QPointF(0, cross.y()), QPointF(cross.x() - kGap_px, cross.y()));
+  painter.drawLine(QPointF(cross.x() + kGap_px, cross.y()), QPointF(width(), cross.y()));
+  painter.setPen(line_colours_[1]);
+  painter.drawLine(QPointF(cross.x(), 0), QPointF(cross.x(), cross.y() - kGap_px));
+  painter.drawLine(QPointF(cross.x(), cross.y() + kGap_px), QPointF(cross.x(), height()));
+  if (!overlay_.tool_axis) return;
+  if (const auto axis = project(image_->plane, overlay_.tool_axis->point_mm, overlay_.tool_axis->direction)) {
+    painter.setPen(QPen(QColor(kToolColour), 1.0, Qt::DotLine));
+    painter.drawLine(to_widget(axis->from), to_widget(axis->to));
+  }
+}
+
+void SliceView::paint_planned(QPainter& painter) const {
+  for (const SliceOverlay::Planned& planned : overlay_.planned) {
+    const auto line = project(image_->plane, planned.point_mm, planned.direction);
+    if (!line) continue;
+    painter.setPen(QPen(QColor(kPlannedColour), 1.5, Qt::DashLine));
+    painter.drawLine(to_widget(line->from), to_widget(line->to));
+    if (!line->through) continue;
+    constexpr double kRing_px = 4.0;
+    painter.setPen(QPen(QColor(kPlannedColour), 1.5));
+    const QPointF through = to_widget(*line->through);
+    painter.drawEllipse(through, kRing_px, kRing_px);
+    write(painter, QRect(through.toPoint() + QPoint(6, -18), QSize(width(), 16)), Qt::AlignLeft | Qt::AlignVCenter,
+          planned.name, QColor(kPlannedColour));
+  }
+}
+
+void SliceView::paint_words(QPainter& painter) const {
+  const radiology::PixelGrid& plane = image_->plane;
+  const QRect inner = rect().adjusted(kMargin_px, kMargin_px, -kMargin_px, -kMargin_px);
+  write(painter, inner, Qt::AlignTop | Qt::AlignLeft, title_, colour_);
+  write(painter, inner, Qt::AlignVCenter | Qt::AlignLeft, letters(-plane.column_mm));
+  write(painter, inner, Qt::AlignVCenter | Qt::AlignRight, letters(plane.column_mm));
+  write(painter, inner, Qt::AlignTop | Qt::AlignHCenter, letters(-plane.row_mm));
+  write(painter, inner, Qt::AlignBottom | Qt::AlignHCenter, letters(plane.row_mm));
+  const double mm_per_px = plane.column_mm.norm() * devicePixelRatioF();
+  const double bar_mm = scale_bar_mm(width() * mm_per_px / 4.0), bar_px = bar_mm / mm_per_px;
+  const QPointF end(inner.right(), inner.bottom() - 1), begin = end - QPointF(bar_px, 0);
+  painter.setPen(QPen(Qt::white, 2));
+  painter.drawLine(begin, end);
+  const int decimals = bar_mm < 1.0 ? 1 : 0;
+  write(painter, inner.adjusted(0, 0, 0, -kMargin_px), Qt::AlignBottom | Qt::AlignRight,
+        tr("%1 mm").arg(QLocale().toString(bar_mm, 'f', decimals)));
+}
+
+void SliceView::resizeEvent(QResizeEvent* event) {
+  QWidget::resizeEvent(event);
+  events_.resized();
+}
+
+void SliceView::mousePressEvent(QMouseEvent* event) {
+  last_ = event->pos();
+  if (image_ && event->button() == Qt::LeftButton) events_.point(point_at(place_under(*event)));
+}
+
+void SliceView::mouseMoveEvent(QMouseEvent* event) {
+  const QPoint by = event->pos() - last_;
+  last_ = event->pos();
+  if (!image_) return;
+  if (event->buttons() & Qt::LeftButton)
+    events_.point(point_at(place_under(*event)));
+  else if (event->buttons() & Qt::RightButton)
+    events_.window(by.x(), by.y());
+  else if (event->buttons() & Qt::MiddleButton)
+    events_.shift(point_at(QPointF(0, 0)) - point_at(by));
+  events_.hovered(point_at(place_under(*event)));
+}
+
+void SliceView::wheelEvent(QWheelEvent* event) {
+  const double notches = event->angleDelta().y() / kNotchOfWheel;
+  if (event->modifiers() & Qt::ControlModifier)
+    events_.zoom(std::pow(kZoomOfNotch, notches));
+  else
+    events_.move(notches);
+  event->accept();
+}
+
+// What the mouse does, by keys.
+void SliceView::keyPressEvent(QKeyEvent* event) {
+  constexpr double kStep_px = 2.0;
+  const auto step = [&](double right, double down) {
+    if (image_) events_.point(point_at(place_of(overlay_.point_mm) + QPointF(right, down)));
+  };
+  switch (event->key()) {
+    case Qt::Key_Left:
+      return step(-kStep_px, 0);
+    case Qt::Key_Right:
+      return step(kStep_px, 0);
+    case Qt::Key_Up:
+      return step(0, -kStep_px);
+    case Qt::Key_Down:
+      return step(0, kStep_px);
+    case Qt::Key_PageUp:
+      return events_.move(1.0);
+    case Qt::Key_PageDown:
+      return events_.move(-1.0);
+    case Qt::Key_Plus:
+      return events_.zoom(kZoomOfNotch);
+    case Qt::Key_Minus:
+      return events_.zoom(1.0 / kZoomOfNotch);
+    default:
+      event->ignore();
+  }
+}
+
+void SliceView::leaveEvent(QEvent* event) {
+  QWidget::leaveEvent(event);
+  events_.hovered(std::nullopt);
+}
+
+}  // namespace osteon
