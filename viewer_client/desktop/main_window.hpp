@@ -27,6 +27,7 @@ class QStackedWidget;
 namespace osteon {
 
 class BoneView;
+class CArmPanel;
 class ClippingPanel;
 class GaugesPanel;
 class GamePadController;
@@ -91,6 +92,7 @@ class MainWindow : public QMainWindow {
   void make_other_hand(QMenu* tools);
   void make_help_menu();
   void make_panels();
+  [[nodiscard]] CArmPanel* make_c_arm();
   void make_status();
 
   // `session`: to go on with in the case, as of practise().
@@ -147,6 +149,7 @@ class MainWindow : public QMainWindow {
   GaugesPanel* gauges_ = nullptr;
   PropertiesPanel* properties_ = nullptr;
   ClippingPanel* clipping_ = nullptr;
+  CArmPanel* c_arm_ = nullptr;
   ViewOptions* view_options_ = nullptr;
   SoundControl* sound_control_ = nullptr;
   Tour* tour_ = nullptr;
