@@ -113,6 +113,7 @@ CArmPanel::CArmPanel(InsideLink& inside, Events events, QWidget* parent)
     const MutexLock lock(mailbox_->mutex);
     mailbox_->panel = this;
   }
+  setObjectName("c_arm");
   image_ = std::make_shared<CArmImage>(
       [to = mailbox_](std::shared_ptr<const CArmPicture> picture) { to->post(std::move(picture)); });
   auto* all = new QVBoxLayout(this);
