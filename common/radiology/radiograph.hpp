@@ -15,7 +15,7 @@ namespace osteon::radiology {
 
 enum class Projection {
   attenuation,  // ∫ μ dl of each ray. The part exp(−∫ μ dl) of the photons gets through.
-  most,         // the largest HU on the planes that a ray meets: a maximum intensity projection. Air where it meets none
+  most,  // the largest HU on the planes that a ray meets: a maximum intensity projection. Air where it meets none
 };
 
 // Not synchronised: one thread. Casting uses as many threads as oneTBB allows (tbb::global_control); the image is the

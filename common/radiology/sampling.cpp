@@ -48,10 +48,9 @@ struct SamplingRows {
 };
 
 constexpr SamplingRows kNarrowRows{narrow::kLanes, narrow::line_rows, narrow::plane_rows<false>,
-                                  narrow::plane_rows<true>};
+                                   narrow::plane_rows<true>};
 #ifdef OSTEON_WIDE_ROWS
-constexpr SamplingRows kWideRows{wide::kLanes, wide::line_rows, wide::plane_rows<false>,
-                                wide::plane_rows<true>};
+constexpr SamplingRows kWideRows{wide::kLanes, wide::line_rows, wide::plane_rows<false>, wide::plane_rows<true>};
 #endif
 
 const SamplingRows* widest_sampling([[maybe_unused]] int lanes) {

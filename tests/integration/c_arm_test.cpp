@@ -33,7 +33,6 @@ double per_mm(double density_g_cm3) { return radiology::attenuation_per_mm((dens
 constexpr double kCortex_mm = 5.0, kMarrow_mm = 20.0;
 // 1 µGy at 1 m, in 1 mm², of which 65 % count (intensifier_test.cpp). A tenth of the light spreads as glare.
 constexpr double kPhotons_per_ugy_mm2 = 30460.0 * 0.65, kNoGlare = 0.9;
-constexpr double kPixel_mm = 0.375;
 
 class CArmTest : public test::WindowBench {
  protected:
@@ -48,7 +47,8 @@ class CArmTest : public test::WindowBench {
   [[nodiscard]] std::string bar() const { return window_->statusBar()->toolTip().toStdString(); }
   void show_panel() {
     if (!dock()->isVisible()) dock()->toggleViewAction()->trigger();
-    ASSERT_TRUE(until([&] { return button("c_arm_shot")->isEnabled(); })) << problem() << label("c_arm_words").toStdString();
+    ASSERT_TRUE(until([&] { return button("c_arm_shot")->isEnabled(); }))
+        << problem() << label("c_arm_words").toStdString();
   }
   void click(const char* name) { QTest::mouseClick(button(name), Qt::LeftButton); }
   [[nodiscard]] std::uint64_t shots() const { return panel().console().totals().shots; }
@@ -70,7 +70,8 @@ class CArmTest : public test::WindowBench {
     double sum = 0.0, count = 0.0;
     for (int row = 0; row < picture.rows; ++row)
       for (int column = 0; column < picture.columns; ++column) {
-        const Vec3 ray = (beam->detector.at(column, row) - beam->source_mm).normalized(), to = point_mm - beam->source_mm;
+        const Vec3 ray = (beam->detector.at(column, row) - beam->source_mm).normalized(),
+                   to = point_mm - beam->source_mm;
         if ((to - ray.dot(to) * ray).norm() > radius_mm) continue;
         sum += std::exp(black + range * picture.grey[beam->detector.index(column, row)] / 255.0);
         count += 1.0;
@@ -251,7 +252,8 @@ TEST_F(CArmTest, ShootsOnlyWhileItIsWantedAndLosesNothing) {
   EXPECT_FALSE(button("c_arm_shot")->isEnabled());
   EXPECT_THAT(button("c_arm_shot")->toolTip().toStdString(), HasSubstr("needs no X-rays"));
   const fs::path file = desk_->temp() / "maximum.png", shot_file = desk_->temp() / "shot.png";
-  EXPECT_TRUE(until([&] { return panel().save(file, true) && QImage(QString::fromStdString(file.string())).width() == 800; }));
+  EXPECT_TRUE(
+      until([&] { return panel().save(file, true) && QImage(QString::fromStdString(file.string())).width() == 800; }));
   EXPECT_EQ(shots(), hidden);
   window_->findChild<QComboBox*>("c_arm_kind")->setCurrentIndex(0);
   EXPECT_TRUE(button("c_arm_shot")->isEnabled());

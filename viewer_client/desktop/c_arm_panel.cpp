@@ -200,12 +200,12 @@ QLayout* CArmPanel::make_views() {
          [this] { console_.set_isocentre(console_.middle_of_bone()); });
   button(*centres, tr("Tip in the middle"), "c_arm_tip", tr("The arm turns about the tip of your tool"), [this] {
     if (const std::optional<Vec3> tip = events_.in_beam().tip_mm) return console_.set_isocentre(*tip);
-    events_.say(tr("Your hand holds no tool. Take one, then its tip can be the middle of the picture."));
+    events_.say(tr("Your hand holds no tool. Take one first."));
   });
   kind_ = new QComboBox;
   kind_->setObjectName("c_arm_kind");
   kind_->setAccessibleName(tr("Kind of picture"));
-  kind_->setToolTip(tr("A maximum intensity projection shows the densest bone on each ray, without X-rays."));
+  kind_->setToolTip(tr("Maximum intensity: the densest bone on each ray, without X-rays"));
   kind_->addItem(tr("X-ray"));
   kind_->addItem(tr("Maximum intensity"));
   connect(kind_, QOverload<int>::of(&QComboBox::currentIndexChanged), this, [this] { show_maximum(); });
@@ -218,7 +218,7 @@ QLayout* CArmPanel::make_views() {
 void CArmPanel::make_rows(QFormLayout& form) {
   constexpr int kOrbit_deg = 180, kTilt_deg = 90;
   static_assert(kOrbit_deg * kDegree_rad - kMostOrbit_rad < 1e-9 && kTilt_deg * kDegree_rad - kMostTilt_rad < 1e-9);
-  const QString degree = tr("°"), mm = tr(" mm");
+  const QString degree = "°", mm = tr(" mm");
   rows_[0] = add_row(form, tr("Orbit"), "c_arm_orbit", kOrbit_deg, degree,
                      [this](double degrees) { console_.set_orbit(degrees * kDegree_rad); });
   rows_[1] = add_row(form, tr("Tilt"), "c_arm_tilt", kTilt_deg, degree,
@@ -254,7 +254,8 @@ CArmPanel::Row CArmPanel::add_row(QFormLayout& form, const QString& what, const 
     show_position();
     moved();
   };
-  connect(row.slider, &QSlider::valueChanged, this, [change](int steps) { change(double(steps) / kStepsOfUnit); });
+  connect(row.slider, &QSlider::valueChanged, this,
+          [change](int steps) { change(static_cast<double>(steps) / kStepsOfUnit); });
   connect(row.box, QOverload<double>::of(&QDoubleSpinBox::valueChanged), this, change);
   auto* both = new QHBoxLayout;
   both->addWidget(row.slider, 1);
@@ -273,8 +274,8 @@ void CArmPanel::make_counters(QFormLayout& form) {
   shots_ = label(tr("Shots"), "c_arm_shots");
   seconds_ = label(tr("Exposure"), "c_arm_seconds");
   dose_ = label(tr("Dose-area product"), "c_arm_dose");
-  auto* warning = new QLabel(
-      tr("The dose-area product is nominal: it follows from the setting of the tube alone. It is no dose of a person."));
+  auto* warning = new QLabel(tr(
+      "The dose-area product is nominal: it follows from the setting of the tube alone. It is no dose of a person."));
   warning->setObjectName("c_arm_warning");
   warning->setWordWrap(true);
   form.addRow(warning);
@@ -327,8 +328,7 @@ void CArmPanel::show_status() {
                                            : fault_;
   if (words_->text() != words) words_->setText(words);
   words_->setVisible(!words.isEmpty());
-  const QString reason =
-      maximum() ? tr("Maximum intensity needs no X-rays. Choose X-ray to shoot some.") : trouble;
+  const QString reason = maximum() ? tr("Maximum intensity needs no X-rays. Choose X-ray first.") : trouble;
   for (QPushButton* pedal : {single_, pulse_, live_})
     if (pedal->isEnabled() != reason.isEmpty() || !reason.isEmpty()) set_enabled(*pedal, reason.isEmpty(), reason);
   const bool any = !(maximum() ? projection_ : shot_).isNull();

@@ -102,8 +102,8 @@ class CArmPanel : public QWidget {
   std::optional<ShotFile> file_;
   std::optional<MetalInBeam> metal_;  // of this room; none: nothing was shot yet
   std::size_t tools_known_ = 0;
-  std::shared_ptr<Mailbox> mailbox_;   // shared with image_
-  std::shared_ptr<CArmImage> image_;   // shared with the inside of the bone
+  std::shared_ptr<Mailbox> mailbox_;  // shared with image_
+  std::shared_ptr<CArmImage> image_;  // shared with the inside of the bone
   bool in_room_ = false;
   bool run_begins_ = false;  // the next shot is the first one of a press
   QTimer pedal_timer_, status_timer_;

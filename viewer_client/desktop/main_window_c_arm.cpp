@@ -7,19 +7,20 @@
 namespace osteon {
 
 CArmPanel* MainWindow::make_c_arm() {
-  return new CArmPanel(
-      inside_, {[this] {
-                  CArmPanel::InBeam seen;
-                  const SceneUpdater* updater = view_->updater();
-                  if (updater == nullptr || !room_) return seen;
-                  seen.states = updater->states();
-                  seen.items = updater->items();
-                  seen.tools = updater->tools();
-                  const CuttingState* own = own_state(seen.states, room_->people(), own_name_.toStdString());
-                  if (own != nullptr && !own->tool_name.empty()) seen.tip_mm = own->pose_bone_tool.position_mm;
-                  return seen;
-                },
-                [this](const QString& sentence) { say(sentence); }});
+  return new CArmPanel(inside_, {[this] {
+                                   CArmPanel::InBeam seen;
+                                   const SceneUpdater* updater = view_->updater();
+                                   if (updater == nullptr || !room_) return seen;
+                                   seen.states = updater->states();
+                                   seen.items = updater->items();
+                                   seen.tools = updater->tools();
+                                   const CuttingState* own =
+                                       own_state(seen.states, room_->people(), own_name_.toStdString());
+                                   if (own != nullptr && !own->tool_name.empty())
+                                     seen.tip_mm = own->pose_bone_tool.position_mm;
+                                   return seen;
+                                 },
+                                 [this](const QString& sentence) { say(sentence); }});
 }
 
 }  // namespace osteon

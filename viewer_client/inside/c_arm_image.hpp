@@ -21,8 +21,8 @@ struct CArmPicture {
   CArmShot shot;            // without its number
   bool coarse = false;      // fewer and larger pixels; the whole picture follows, unless something newer does
   int columns = 0, rows = 0;
-  std::vector<std::uint8_t> grey;   // row by row
-  radiology::Contrast contrast;     // of a radiograph: which photons are black and white
+  std::vector<std::uint8_t> grey;  // row by row
+  radiology::Contrast contrast;    // of a radiograph: which photons are black and white
 };
 
 class CArmImage final : public InsidePainter {

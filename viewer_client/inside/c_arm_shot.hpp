@@ -35,10 +35,10 @@ struct CArmShot {
   std::int64_t time_unix_ms = 0;  // when it was asked for
   ShotMode mode = ShotMode::single;
   CArmPosition position;
-  double exposure_s = 0.0;                // for how long the tube was on
-  double air_kerma_at_metre_ugy = 0.0;    // of this shot
-  double dose_area_gy_cm2 = 0.0;          // nominal
-  std::uint64_t seed = 0;                 // of its noise
+  double exposure_s = 0.0;              // for how long the tube was on
+  double air_kerma_at_metre_ugy = 0.0;  // of this shot
+  double dose_area_gy_cm2 = 0.0;        // nominal
+  std::uint64_t seed = 0;               // of its noise
   friend bool operator==(const CArmShot&, const CArmShot&) = default;
 };
 

@@ -67,9 +67,9 @@ ShotFile::Kept ShotFile::read() const {
   Kept kept;
   std::error_code ignored;
   if (!std::filesystem::exists(file_, ignored)) return kept;
-  const Result<std::string> content =
-      std::filesystem::is_regular_file(file_, ignored) ? read_file(file_)
-                                                       : bad_input(file_.string() + " is no file; remove it");
+  const Result<std::string> content = std::filesystem::is_regular_file(file_, ignored)
+                                          ? read_file(file_)
+                                          : bad_input(file_.string() + " is no file; remove it");
   if (!content) {
     kept.fault = content.error().message + "; the shots of before are not counted";
     return kept;

@@ -375,7 +375,8 @@ TEST(Radiograph, TheMaximumIsThatOfAllPlanes) {
     for (int row = 0; row < grid.rows; row += 3)
       for (int column = row / 3 % 2; column < grid.columns; column += 2) {
         double most = 0.0;
-        for (const double value : plain_planes(bone, beam.source_mm, grid.at(column, row))) most = std::max(most, value);
+        for (const double value : plain_planes(bone, beam.source_mm, grid.at(column, row)))
+          most = std::max(most, value);
         const float found = image.values()[grid.index(column, row)];
         // A step is 1.05 HU. Rounding of the ray's place in 32 bits moves a value by less.
         ASSERT_NEAR(found, hu_of_steps(static_cast<float>(most / kStep_per_mm)), 0.5f);

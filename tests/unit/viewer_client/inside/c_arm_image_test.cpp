@@ -19,7 +19,9 @@ const double kBone_per_mm = radiology::attenuation_per_mm((kDensity_g_cm3 - 0.13
 constexpr double kPhotons_per_ugy_mm2 = 30460.0 * 0.65;
 
 // Along z, about the middle of a plate.
-CArmPosition axial(double orbit_rad = 0.0) { return {{0, 0, -0.5 * kThick_mm}, orbit_rad, 1.5707963267948966, {0, 0, 0}}; }
+CArmPosition axial(double orbit_rad = 0.0) {
+  return {{0, 0, -0.5 * kThick_mm}, orbit_rad, 1.5707963267948966, {0, 0, 0}};
+}
 
 ShotOrder order_at(std::uint64_t id, const CArmPosition& position) { return {id, ShotMode::single, position, 70 + id}; }
 
@@ -69,7 +71,8 @@ class CArmPictures : public testing::Test {
     for (int row = 0; row < picture.rows; ++row)
       for (int column = 0; column < picture.columns; ++column) {
         const Vec3 pixel = beam->detector.at(column, row);
-        const Vec3 on_plate = beam->source_mm + 0.6 * (pixel - beam->source_mm);  // the isocentre is 600 of 1000 mm away
+        const Vec3 on_plate =
+            beam->source_mm + 0.6 * (pixel - beam->source_mm);  // the isocentre is 600 of 1000 mm away
         if ((on_plate - middle).norm() > radius_mm) continue;
         const double grey = picture.grey[beam->detector.index(column, row)] / 255.0;
         const double black = std::log(static_cast<double>(picture.contrast.black));

@@ -77,7 +77,8 @@ TEST(ShotFile, IsReadAgain) {
   EXPECT_FALSE(fs::exists(temp / kShotFileName)) << "nothing was shot";
   for (int window = 0; window < 2; ++window) {
     ShotFile file(temp.path());
-    for (std::uint64_t i = 1; i <= 2; ++i) ASSERT_TRUE(file.add(shot_number(2 * static_cast<std::uint64_t>(window) + i)));
+    for (std::uint64_t i = 1; i <= 2; ++i)
+      ASSERT_TRUE(file.add(shot_number(2 * static_cast<std::uint64_t>(window) + i)));
   }
   const ShotFile::Kept kept = ShotFile(temp.path()).read();
   EXPECT_EQ(kept.shots, shots_to(4));
