@@ -274,8 +274,8 @@ void CArmPanel::make_counters(QFormLayout& form) {
   shots_ = label(tr("Shots"), "c_arm_shots");
   seconds_ = label(tr("Exposure"), "c_arm_seconds");
   dose_ = label(tr("Dose-area product"), "c_arm_dose");
-  auto* warning = new QLabel(tr(
-      "The dose-area product is nominal: it follows from the setting of the tube alone. It is no dose of a person."));
+  auto* warning = new QLabel(tr("Nominal: it follows from the setting of the tube alone.") + ' ' +
+                             tr("It is no dose of a person."));
   warning->setObjectName("c_arm_warning");
   warning->setWordWrap(true);
   form.addRow(warning);

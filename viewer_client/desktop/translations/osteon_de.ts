@@ -143,10 +143,6 @@
         <translation>Dosisflächenprodukt</translation>
     </message>
     <message>
-        <source>The dose-area product is nominal: it follows from the setting of the tube alone. It is no dose of a person.</source>
-        <translation>Das Dosisflächenprodukt ist nominal: Es folgt allein aus der Einstellung der Röhre. Es ist keine Dosis eines Menschen.</translation>
-    </message>
-    <message>
         <source>%1 s</source>
         <translation>%1 s</translation>
     </message>
@@ -201,6 +197,14 @@
     <message>
         <source>Maximum intensity needs no X-rays. Choose X-ray first.</source>
         <translation>Maximumintensität braucht keine Strahlung. Wählen Sie dazu Röntgen.</translation>
+    </message>
+    <message>
+        <source>Nominal: it follows from the setting of the tube alone.</source>
+        <translation>Nominal: Es folgt allein aus der Einstellung der Röhre.</translation>
+    </message>
+    <message>
+        <source>It is no dose of a person.</source>
+        <translation>Es ist keine Dosis eines Menschen.</translation>
     </message>
 </context>
 <context>
