@@ -429,8 +429,8 @@ void CArmPanel::receive(const std::shared_ptr<const CArmPicture>& picture) {
   shot_ = image_of(*picture);
   if (!maximum()) last_->show_picture(shot_);
   show_status();
-  if (!console_.held() && !picture->coarse) pedal_timer_.stop();
   tick();
+  if (console_.idle()) pedal_timer_.stop();
 }
 
 // The picture beside the last one is that of the press before it: a live picture changes too soon to be compared with.

@@ -55,6 +55,8 @@ class CArmConsole {
   void press(ShotMode mode, Clock::time_point now);
   void release() { held_.reset(); }
   [[nodiscard]] std::optional<ShotMode> held() const { return held_; }
+  // Nothing is pressed, due or on its way.
+  [[nodiscard]] bool idle() const { return !held_ && !owed_ && !under_way_; }
   // Drops what was pressed and what is on its way, as when the pane closes.
   void stop();
 

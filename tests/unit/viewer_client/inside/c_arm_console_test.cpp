@@ -93,7 +93,9 @@ TEST_F(Console, ShootsOnceForAPress) {
   EXPECT_EQ(run(1s), 1);
   console_.press(ShotMode::live, now_);
   console_.release();
+  EXPECT_FALSE(console_.idle()) << "it is due";
   EXPECT_EQ(run(1s), 1) << "a tap of a pedal";
+  EXPECT_TRUE(console_.idle());
   ASSERT_EQ(console_.shots().size(), 2u);
   EXPECT_EQ(console_.shots()[0].number, 1u);
   EXPECT_EQ(console_.shots()[1].number, 2u);
