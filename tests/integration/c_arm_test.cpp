@@ -83,19 +83,20 @@ class CArmTest : public test::WindowBench {
   void bore() {
     hold_drill();
     view_->pointer().set_push(30.0);
-    EXPECT_TRUE(push_until([&] {
-      const auto states = view_->updater()->states();
-      if (states.empty() || states.front().tool_name.empty()) return false;
-      const Pose& now = states.front().pose_bone_tool;
-      if (now.position_mm.z() < deepest_.position_mm.z()) deepest_ = now;
-      return deepest_.position_mm.z() < -9.0;
-    })) << problem();
+    // Whether the hand is empty. Notes the deepest place of the drill on the way.
+    const auto empty = [&] {
+      for (const CuttingState& state : view_->updater()->states()) {
+        if (state.tool_name.empty()) continue;
+        if (state.pose_bone_tool.position_mm.z() < deepest_.position_mm.z()) deepest_ = state.pose_bone_tool;
+        return false;
+      }
+      return true;
+    };
+    EXPECT_TRUE(push_until([&] { return !empty() && deepest_.position_mm.z() < -9.0; })) << problem();
     release(middle());
+    EXPECT_FALSE(until([&] { return empty(); }, std::chrono::seconds(2))) << "the hand comes to rest";
     trigger("put_down");
-    EXPECT_TRUE(until([&] {
-      const auto states = view_->updater()->states();
-      return std::ranges::all_of(states, [](const CuttingState& state) { return state.tool_name.empty(); });
-    })) << problem();
+    EXPECT_TRUE(until(empty)) << problem();
     QTest::qWait(500);
   }
   // On the drill's axis, in the middle of the cortex.
