@@ -163,7 +163,9 @@ Bricks::Corner corner_of(const RayPacket& p, std::size_t lane) {
   return {p.u[lane], p.du[lane], p.v[lane], p.dv[lane]};
 }
 
-void cast_rays(const HuLattice& lattice, std::span<Rays> rays, bool one_axis, int packets_a_row) {
+void cast_rays(const HuLattice& lattice, std::span<Rays> rays, bool one_axis, int packets_a_row,
+               Projection projection) {
+  const auto add = projection == Projection::most ? most_of_planes : add_planes;
   const int planes[3] = {lattice.dims.x, lattice.dims.y, lattice.dims.z};
   for (int axis = 0; axis < 3; ++axis) {
     if (std::ranges::none_of(rays, [&](const Rays& r) { return r.axis == axis; })) continue;
@@ -180,7 +182,7 @@ void cast_rays(const HuLattice& lattice, std::span<Rays> rays, bool one_axis, in
       for (Rays& r : rays) {
         if (r.axis != axis) continue;
         const std::array<Bricks::Corner, 2> ends{corner_of(r.packet, 0), corner_of(r.packet, kRays - 1)};
-        if (bricks.any(layer, ends)) add_planes(lattice, axis, first, last, r.packet, r.sums);
+        if (bricks.any(layer, ends)) add(lattice, axis, first, last, r.packet, r.sums);
       }
     }
   }
@@ -201,9 +203,14 @@ bool merge_once(std::vector<PixelBox>& boxes) {
 
 }  // namespace
 
-Radiograph::Radiograph(const ConeBeam& beam) : beam_(beam) {
+Radiograph::Radiograph(const ConeBeam& beam, Projection projection) : beam_(beam), projection_(projection) {
   OSTEON_CHECK(beam.detector.columns > 0 && beam.detector.rows > 0);
-  attenuation_.resize(beam.detector.count());
+  values_.resize(beam.detector.count());
+}
+
+std::span<const float> Radiograph::attenuation() const {
+  OSTEON_CHECK(projection_ == Projection::attenuation);
+  return values_;
 }
 
 void Radiograph::cast(const BoneHu& bone) { cast_box(bone, beam_.detector.whole()); }
@@ -239,12 +246,14 @@ void Radiograph::cast_box(const BoneHu& bone, const PixelBox& box) {
       for (int column = tile_column; column <= last_column; column += kRays)
         add_rays(beam, row, column, std::min(kRays, last_column - column + 1), rays);
     const bool one_axis = std::ranges::all_of(rays, [&](const Rays& r) { return r.axis == rays.front().axis; });
-    cast_rays(lattice, rays, one_axis, packets);
+    cast_rays(lattice, rays, one_axis, packets, projection_);
     for (const Rays& r : rays)
       for (std::size_t lane = 0; lane < kRays; ++lane)
         if (r.column[lane] >= 0)
-          attenuation_[beam_.detector.index(r.column[lane], r.row)] =
-              static_cast<float>(static_cast<double>(r.sums[lane]) * r.mm[lane] * kStep_per_mm);
+          values_[beam_.detector.index(r.column[lane], r.row)] =
+              projection_ == Projection::most
+                  ? hu_of_steps(r.sums[lane])
+                  : static_cast<float>(static_cast<double>(r.sums[lane]) * r.mm[lane] * kStep_per_mm);
   };
   const int tile_rows = (box.last_row - box.first_row) / kTileRows + 1;
   const auto cast_rows = [&](int first, int last) {

@@ -44,12 +44,13 @@ constexpr int kLanes = 8;
 struct SamplingRows {
   int lanes;
   decltype(&narrow::line_rows) line;
-  decltype(&narrow::plane_rows) planes;
+  decltype(&narrow::plane_rows<false>) planes, most;
 };
 
-constexpr SamplingRows kNarrowRows{narrow::kLanes, narrow::line_rows, narrow::plane_rows};
+constexpr SamplingRows kNarrowRows{narrow::kLanes, narrow::line_rows, narrow::plane_rows<false>,
+                                   narrow::plane_rows<true>};
 #ifdef OSTEON_WIDE_ROWS
-constexpr SamplingRows kWideRows{wide::kLanes, wide::line_rows, wide::plane_rows};
+constexpr SamplingRows kWideRows{wide::kLanes, wide::line_rows, wide::plane_rows<false>, wide::plane_rows<true>};
 #endif
 
 const SamplingRows* widest_sampling([[maybe_unused]] int lanes) {
@@ -74,6 +75,11 @@ void sample_line(const HuLattice& lattice, const std::array<float, 3>& start, co
 void add_planes(const HuLattice& lattice, int axis, int first, int last, const RayPacket& rays,
                 std::array<float, kRays>& sums) {
   chosen_sampling().load(std::memory_order_relaxed)->planes(lattice, axis, first, last, rays, sums.data());
+}
+
+void most_of_planes(const HuLattice& lattice, int axis, int first, int last, const RayPacket& rays,
+                    std::array<float, kRays>& most) {
+  chosen_sampling().load(std::memory_order_relaxed)->most(lattice, axis, first, last, rays, most.data());
 }
 
 int limit_sampling_lanes(int lanes) {

@@ -25,6 +25,11 @@ struct RayPacket {
 void add_planes(const HuLattice& lattice, int axis, int first, int last, const RayPacket& rays,
                 std::array<float, kRays>& sums);
 
+// The same, but keeps the largest of what is given and of the steps on these planes: for maximum intensity. Steps are
+// never below zero.
+void most_of_planes(const HuLattice& lattice, int axis, int first, int last, const RayPacket& rays,
+                    std::array<float, kRays>& most);
+
 // For tests: limits the number of samples computed at once (4 or 8). Returns the width in use.
 int limit_sampling_lanes(int lanes);
 

@@ -93,7 +93,8 @@ struct PlaneStrides {
   std::int32_t u, v, size_u, size_v;
 };
 
-template <bool kPairs>
+// kMost: the largest value of the planes, and not their sum.
+template <bool kPairs, bool kMost>
 void ray_rows(const HuLattice& lattice, const PlaneStrides& s, int first, int last, const RayPacket& rays, int lane,
               float* sums) {
   const auto lanes = static_cast<std::size_t>(lane);
@@ -115,19 +116,21 @@ void ray_rows(const HuLattice& lattice, const PlaneStrides& s, int first, int la
                 c = lower_of(pairs(plane, place + s.u)), d = lower_of(pairs(plane, place + (s.u + s.v)));
       value = mixed(mixed(a, b, cv.weight), mixed(c, d, cv.weight), cu.weight);
     }
-    sum = sum + ((at >= begin) & (at <= end) ? value : none);
+    const Row met = (at >= begin) & (at <= end) ? value : none;
+    sum = kMost ? high(sum, met) : sum + met;
   }
   store(sums + lane, sum);
 }
 
+template <bool kMost>
 void plane_rows(const HuLattice& lattice, int axis, int first, int last, const RayPacket& rays, float* sums) {
   const std::int32_t nz = lattice.dims.z, plane = lattice.dims.y * nz;
   for (int lane = 0; lane < kRays; lane += kLanes) {
     if (axis == 0)
-      ray_rows<true>(lattice, {plane, nz, 1, lattice.dims.y, nz}, first, last, rays, lane, sums);
+      ray_rows<true, kMost>(lattice, {plane, nz, 1, lattice.dims.y, nz}, first, last, rays, lane, sums);
     else if (axis == 1)
-      ray_rows<true>(lattice, {nz, plane, 1, lattice.dims.x, nz}, first, last, rays, lane, sums);
+      ray_rows<true, kMost>(lattice, {nz, plane, 1, lattice.dims.x, nz}, first, last, rays, lane, sums);
     else
-      ray_rows<false>(lattice, {1, plane, nz, lattice.dims.x, lattice.dims.y}, first, last, rays, lane, sums);
+      ray_rows<false, kMost>(lattice, {1, plane, nz, lattice.dims.x, lattice.dims.y}, first, last, rays, lane, sums);
   }
 }

@@ -34,6 +34,7 @@
 
 #include "common/tools/tool.hpp"
 #include "viewer_client/desktop/bone_view.hpp"
+#include "viewer_client/desktop/c_arm_panel.hpp"
 #include "viewer_client/desktop/clipping_panel.hpp"
 #include "viewer_client/desktop/connection_panel.hpp"
 #include "viewer_client/desktop/enabled.hpp"
@@ -132,7 +133,10 @@ MainWindow::MainWindow() {
   restoreState(settings.value("window/state").toByteArray());
 }
 
-MainWindow::~MainWindow() { leave_room(); }
+MainWindow::~MainWindow() {
+  leave_room();
+  delete c_arm_;  // it uses a member, and Qt would delete it after those
+}
 
 void MainWindow::make_panels() {
   tools_ = new SurgeryToolBar([this](const std::string& tool) { take_tool(tool); }, this);
@@ -169,6 +173,8 @@ void MainWindow::make_panels() {
   slices_ = new SlicesPanel(inside_);
   QDockWidget* slices = dock(tr("Slices"), "slices_panel", slices_, Qt::BottomDockWidgetArea);
   setCorner(Qt::BottomRightCorner, Qt::RightDockWidgetArea);  // the gauges keep their height
+  c_arm_ = make_c_arm();
+  dock(tr("C-arm"), "c_arm_panel", c_arm_, Qt::LeftDockWidgetArea)->hide();
   // One above the other, four panels would show little of each. Three tabs beside each other would cut their titles.
   tabifyDockWidget(tool, clipping);
   tabifyDockWidget(gauges, connections);
@@ -386,6 +392,7 @@ void MainWindow::show_joined(const WatchedRoom& room) {
   clipping_->reset(room.bounds);
   slices_->reset(room.bounds, room.pitch_mm);
   inside_.set_room(room_.get(), opened_ ? opened_->bone : std::filesystem::path());
+  c_arm_->enter(room.bounds, opened_ ? opened_->session : std::filesystem::path());
   view_options_->show_bone(QString::fromStdString(room.case_title));
   view_->set_notice({});
   view_->arrived();
@@ -422,6 +429,7 @@ void MainWindow::leave_room() {
   undo_points_.clear();
   view_->show_room(nullptr, {});
   risk_->set_plan(nullptr);
+  c_arm_->leave();
   inside_.set_room(nullptr);
   room_.reset();
   slices_->reset({}, 1.0);

@@ -27,6 +27,7 @@ class QStackedWidget;
 namespace osteon {
 
 class BoneView;
+class CArmPanel;
 class ClippingPanel;
 class GaugesPanel;
 class GamePadController;
@@ -92,6 +93,7 @@ class MainWindow : public QMainWindow {
   void make_other_hand(QMenu* tools);
   void make_help_menu();
   void make_panels();
+  [[nodiscard]] CArmPanel* make_c_arm();
   void make_status();
 
   // `session`: to go on with in the case, as of practise().
@@ -149,6 +151,7 @@ class MainWindow : public QMainWindow {
   PropertiesPanel* properties_ = nullptr;
   ClippingPanel* clipping_ = nullptr;
   SlicesPanel* slices_ = nullptr;
+  CArmPanel* c_arm_ = nullptr;
   ViewOptions* view_options_ = nullptr;
   SoundControl* sound_control_ = nullptr;
   Tour* tour_ = nullptr;

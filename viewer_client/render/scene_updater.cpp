@@ -11,7 +11,10 @@ namespace osteon {
 bool SceneUpdater::update(bool tools_shown) {
   Delivery delivery = queue_->take();
   bool changed = false;
-  for (const Tool& tool : delivery.tools) scene_->learn_tool(tool);
+  for (const Tool& tool : delivery.tools) {
+    scene_->learn_tool(tool);
+    tools_.push_back(tool);
+  }
   if (delivery.any_states) {
     states_ = std::move(delivery.states);
     changed = tools_shown && !std::ranges::equal(drawn_, states_, [](const CuttingState& a, const CuttingState& b) {

@@ -34,6 +34,8 @@ class SceneUpdater {
   [[nodiscard]] std::span<const CuttingState> states() const { return states_; }
   [[nodiscard]] const std::vector<SceneItem>& items() const { return items_; }
   [[nodiscard]] const std::vector<BodyId>& bodies() const { return bodies_; }
+  // Those that are not built in, as the room defines them.
+  [[nodiscard]] const std::vector<Tool>& tools() const { return tools_; }
   [[nodiscard]] const SurfaceScene& surface() const { return surface_; }
   // The whole surface was received.
   [[nodiscard]] bool complete() const { return complete_; }
@@ -56,6 +58,7 @@ class SceneUpdater {
   std::vector<CuttingState> states_;
   std::vector<CuttingState> drawn_;  // when the tools changed last; many small motions add up to one that is seen
   std::vector<SceneItem> items_;
+  std::vector<Tool> tools_;
   std::vector<BodyId> bodies_;
   std::shared_ptr<const SurgicalPlan> plan_;  // shared with the scene and with distances
   std::string plan_fault_;

@@ -9,6 +9,212 @@
     </message>
 </context>
 <context>
+    <name>CArmPanel</name>
+    <message>
+        <source>The last picture</source>
+        <translation>Das letzte Bild</translation>
+    </message>
+    <message>
+        <source>The picture before it</source>
+        <translation>Das Bild davor</translation>
+    </message>
+    <message>
+        <source>Shot</source>
+        <translation>Aufnahme</translation>
+    </message>
+    <message>
+        <source>One X-ray picture (F7)</source>
+        <translation>Ein Röntgenbild (F7)</translation>
+    </message>
+    <message>
+        <source>Pulse</source>
+        <translation>Gepulst</translation>
+    </message>
+    <message>
+        <source>Hold it: %1 pictures a second (F8)</source>
+        <translation>Halten: %1 Bilder in der Sekunde (F8)</translation>
+    </message>
+    <message>
+        <source>Live</source>
+        <translation>Dauernd</translation>
+    </message>
+    <message>
+        <source>Hold it: X-rays all the time (F9)</source>
+        <translation>Halten: Röntgenstrahlung die ganze Zeit (F9)</translation>
+    </message>
+    <message>
+        <source>Save…</source>
+        <translation>Speichern…</translation>
+    </message>
+    <message>
+        <source>Saves the last picture as a PNG file</source>
+        <translation>Speichert das letzte Bild als PNG-Datei</translation>
+    </message>
+    <message>
+        <source>AP</source>
+        <translation>a.-p.</translation>
+    </message>
+    <message>
+        <source>Anteroposterior: the tube behind the patient</source>
+        <translation>Anterior-posterior: die Röhre hinter dem Patienten</translation>
+    </message>
+    <message>
+        <source>Lateral</source>
+        <translation>Seitlich</translation>
+    </message>
+    <message>
+        <source>From the side</source>
+        <translation>Von der Seite</translation>
+    </message>
+    <message>
+        <source>Axial</source>
+        <translation>Axial</translation>
+    </message>
+    <message>
+        <source>Along the patient</source>
+        <translation>Längs des Patienten</translation>
+    </message>
+    <message>
+        <source>Bone in the middle</source>
+        <translation>Knochen in die Mitte</translation>
+    </message>
+    <message>
+        <source>The arm turns about the middle of the bone</source>
+        <translation>Der Bogen dreht sich um die Mitte des Knochens</translation>
+    </message>
+    <message>
+        <source>Tip in the middle</source>
+        <translation>Spitze in die Mitte</translation>
+    </message>
+    <message>
+        <source>The arm turns about the tip of your tool</source>
+        <translation>Der Bogen dreht sich um die Spitze Ihres Werkzeugs</translation>
+    </message>
+    <message>
+        <source>Kind of picture</source>
+        <translation>Art des Bildes</translation>
+    </message>
+    <message>
+        <source>X-ray</source>
+        <translation>Röntgen</translation>
+    </message>
+    <message>
+        <source>Maximum intensity</source>
+        <translation>Maximumintensität</translation>
+    </message>
+    <message>
+        <source> mm</source>
+        <translation> mm</translation>
+    </message>
+    <message>
+        <source>Orbit</source>
+        <translation>Orbit</translation>
+    </message>
+    <message>
+        <source>Tilt</source>
+        <translation>Kippung</translation>
+    </message>
+    <message>
+        <source>To the left</source>
+        <translation>Nach links</translation>
+    </message>
+    <message>
+        <source>To the back</source>
+        <translation>Nach hinten</translation>
+    </message>
+    <message>
+        <source>To the head</source>
+        <translation>Zum Kopf</translation>
+    </message>
+    <message>
+        <source>%1: at most %2 to either side</source>
+        <translation>%1: höchstens %2 zu jeder Seite</translation>
+    </message>
+    <message>
+        <source>Shots</source>
+        <translation>Aufnahmen</translation>
+    </message>
+    <message>
+        <source>Exposure</source>
+        <translation>Strahlzeit</translation>
+    </message>
+    <message>
+        <source>Dose-area product</source>
+        <translation>Dosisflächenprodukt</translation>
+    </message>
+    <message>
+        <source>%1 s</source>
+        <translation>%1 s</translation>
+    </message>
+    <message>
+        <source>%1 Gy cm²</source>
+        <translation>%1 Gy cm²</translation>
+    </message>
+    <message>
+        <source>Open a bone or join a room first.</source>
+        <translation>Öffnen Sie erst einen Knochen, oder betreten Sie einen Raum.</translation>
+    </message>
+    <message>
+        <source>The inside of the bone is on its way.</source>
+        <translation>Das Innere des Knochens ist unterwegs.</translation>
+    </message>
+    <message>
+        <source>The inside of the bone is computed: %1 %</source>
+        <translation>Das Innere des Knochens wird berechnet: %1 %</translation>
+    </message>
+    <message>
+        <source>The inside of the bone is not there.</source>
+        <translation>Das Innere des Knochens ist nicht da.</translation>
+    </message>
+    <message>
+        <source>The connection is lost. Pictures show the bone as it was.</source>
+        <translation>Die Verbindung ist verloren. Die Bilder zeigen den Knochen, wie er war.</translation>
+    </message>
+    <message>
+        <source>There is no picture yet.</source>
+        <translation>Es gibt noch kein Bild.</translation>
+    </message>
+    <message>
+        <source>Save the X-ray picture</source>
+        <translation>Röntgenbild speichern</translation>
+    </message>
+    <message>
+        <source>Pictures (*.png)</source>
+        <translation>Bilder (*.png)</translation>
+    </message>
+    <message>
+        <source>Saved %1.</source>
+        <translation>%1 ist gespeichert.</translation>
+    </message>
+    <message>
+        <source>Your hand holds no tool. Take one first.</source>
+        <translation>Ihre Hand hält kein Werkzeug. Nehmen Sie erst eines.</translation>
+    </message>
+    <message>
+        <source>Maximum intensity: the densest bone on each ray, without X-rays</source>
+        <translation>Der dichteste Knochen auf jedem Strahl, ohne Röntgenstrahlung</translation>
+    </message>
+    <message>
+        <source>Maximum intensity needs no X-rays. Choose X-ray first.</source>
+        <translation>Maximumintensität braucht keine Strahlung. Wählen Sie dazu Röntgen.</translation>
+    </message>
+    <message>
+        <source>Nominal: it follows from the setting of the tube alone.</source>
+        <translation>Nominal: Es folgt allein aus der Einstellung der Röhre.</translation>
+    </message>
+    <message>
+        <source>It is no dose of a person.</source>
+        <translation>Es ist keine Dosis eines Menschen.</translation>
+    </message>
+</context>
+<context>
+    <name>CArmScreen</name>
+    <message>
+        <source>No picture yet</source>
+        <translation>Noch kein Bild</translation>
+    </message>
+</context>
+<context>
     <name>CaseMaker</name>
     <message>
         <source>osteon-import ended without a case.</source>
@@ -984,6 +1190,10 @@
     <message>
         <source>Slices</source>
         <translation>Schnittbilder</translation>
+    </message>
+    <message>
+        <source>C-arm</source>
+        <translation>C-Bogen</translation>
     </message>
 </context>
 <context>

@@ -1,0 +1,122 @@
+// The C-arm: X-ray pictures of the bone as it is now. A person turns the arm, presses a pedal, and reads what was shot.
+// Nothing is computed and no X-ray is shot unless somebody asks for it while the panel is shown.
+#pragma once
+#include <QCoreApplication>
+#include <QImage>
+#include <QTimer>
+#include <QWidget>
+#include <array>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <span>
+
+#include "viewer_client/inside/c_arm_console.hpp"
+#include "viewer_client/inside/c_arm_image.hpp"
+#include "viewer_client/inside/shot_file.hpp"
+
+class QComboBox;
+class QDoubleSpinBox;
+class QFormLayout;
+class QLabel;
+class QLayout;
+class QPushButton;
+class QSlider;
+
+namespace osteon {
+
+class CArmScreen;
+class InsideLink;
+
+// [GUI thread]
+class CArmPanel : public QWidget {
+  Q_DECLARE_TR_FUNCTIONS(CArmPanel)
+
+ public:
+  struct InBeam {  // what the room has now; used at once
+    std::span<const CuttingState> states{};
+    std::span<const SceneItem> items{};
+    std::span<const Tool> tools{};  // that are not built in; only more of them come
+    std::optional<Vec3> tip_mm{};   // of the tool in the user's hand
+  };
+  struct Events {
+    std::function<InBeam()> in_beam;
+    std::function<void(const QString&)> say;
+  };
+  // `inside` must outlive it.
+  CArmPanel(InsideLink& inside, Events events, QWidget* parent = nullptr);
+  ~CArmPanel() override;
+
+  // A room, with the shots of its session. `session`: the folder in which they are kept; empty: nowhere.
+  void enter(const Box& bone, const std::filesystem::path& session);
+  void leave();
+
+  [[nodiscard]] const CArmConsole& console() const { return console_; }
+  // Of the last shot. Null: there is none in this window.
+  [[nodiscard]] const std::shared_ptr<const CArmPicture>& picture() const { return picture_; }
+  // Writes the picture that is shown. Error: exists, unless `replace`; not_found (no picture); internal.
+  [[nodiscard]] Result<void> save(const std::filesystem::path& file, bool replace) const;
+
+ protected:
+  void showEvent(QShowEvent* event) override;
+  void hideEvent(QHideEvent* event) override;
+  void changeEvent(QEvent* event) override;
+  bool eventFilter(QObject* watched, QEvent* event) override;
+
+ private:
+  struct Row {  // a slider with its spin box
+    QSlider* slider = nullptr;
+    QDoubleSpinBox* box = nullptr;
+  };
+  // Where pictures of another thread arrive. It outlives the panel, if that thread does.
+  struct Mailbox;
+
+  QLayout* make_screens();
+  QLayout* make_pedals();
+  QLayout* make_views();
+  void make_rows(QFormLayout& form);
+  void make_counters(QFormLayout& form);
+  Row add_row(QFormLayout& form, const QString& what, const char* name, int most, const QString& unit,
+              std::function<void(double)> set);
+  void show_position();
+  void show_counters();
+  void show_status();
+  void choose_file();
+
+  void stop();  // nothing is made or waited for any more
+  void press(ShotMode mode);
+  void release();
+  void tick();
+  void moved();  // by the user
+  void receive(const std::shared_ptr<const CArmPicture>& picture);
+  void keep_shot();
+  [[nodiscard]] bool maximum() const;  // the panel shows maximum intensity, and no X-rays
+  void show_maximum();
+  [[nodiscard]] std::vector<PlacedMetal> metal_in_beam();
+  [[nodiscard]] QString trouble() const;  // why no picture can be made; empty: one can
+
+  InsideLink& inside_;
+  Events events_;
+  CArmConsole console_;
+  std::optional<ShotFile> file_;
+  std::optional<MetalInBeam> metal_;  // of this room; none: nothing was shot yet
+  std::size_t tools_known_ = 0;
+  std::shared_ptr<Mailbox> mailbox_;  // shared with image_
+  std::shared_ptr<CArmImage> image_;  // shared with the inside of the bone
+  bool in_room_ = false;
+  bool run_begins_ = false;  // the next shot is the first one of a press
+  QTimer pedal_timer_, status_timer_;
+
+  std::shared_ptr<const CArmPicture> picture_;
+  CArmScreen *last_ = nullptr, *before_ = nullptr;
+  QImage shot_, shot_before_, projection_;
+  QComboBox* kind_ = nullptr;
+  QPushButton *single_ = nullptr, *pulse_ = nullptr, *live_ = nullptr, *save_ = nullptr;
+  QLabel *shots_ = nullptr, *seconds_ = nullptr, *dose_ = nullptr, *words_ = nullptr;
+  std::array<Row, 5> rows_{};  // orbit, tilt, and along the three axes
+  bool showing_ = false;       // its own change of a value is none of the user's
+  QString fault_;              // of the file of this session
+};
+
+}  // namespace osteon
