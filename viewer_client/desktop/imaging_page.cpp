@@ -114,7 +114,7 @@ QBoxLayout* ImagingPage::make_head() {
   auto* row = new QHBoxLayout;
   add_button(*row, tr("Open a &folder…"), "imaging_folder", tr("The folder of a CT, or a CD"),
              [this] { choose_folder(); });
-  add_button(*row, tr("Open a f&ile…"), "imaging_file", tr("A zip or ISO image, NIfTI, NRRD, MetaImage or InVesalius"),
+  add_button(*row, tr("Open a f&ile…"), "imaging_file", tr("A zip or ISO image, a NIfTI, NRRD or MetaImage file"),
              [this] { choose_file(); });
   words_ = new QLabel;
   words_->setObjectName("imaging_words");
