@@ -173,7 +173,7 @@ QBoxLayout* ImagingPage::make_side() {
   threshold_->setAccessibleName(tr("Threshold of bone"));
   threshold_->setRange(-1000, 4000);
   threshold_->setSingleStep(10);
-  threshold_->setSuffix(" HU");
+  threshold_->setSuffix(tr(" HU"));
   threshold_->setValue(static_cast<int>(history_.now().threshold_hu));
   connect(threshold_, QOverload<int>::of(&QSpinBox::valueChanged), this, [this](int hu) { preview_threshold(hu); });
   form->addRow(tr("Threshold"), threshold_);
