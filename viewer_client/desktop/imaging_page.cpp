@@ -53,8 +53,7 @@ ImagingPage::ImagingPage(Events events, QWidget* parent)
   setObjectName("imaging");
   setFocusPolicy(Qt::StrongFocus);
   stack_ = new QStackedWidget;
-  auto* hint = new QLabel(
-      tr("Open the folder of a CT, a CD, or a file: a zip or ISO image, NIfTI, NRRD, MetaImage or InVesalius."));
+  auto* hint = new QLabel(tr("Open the folder of a CT, a CD, or a file: zip, ISO, NIfTI, NRRD or MetaImage."));
   hint->setWordWrap(true);
   hint->setAlignment(Qt::AlignCenter);
   stack_->addWidget(hint);

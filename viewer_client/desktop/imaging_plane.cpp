@@ -41,9 +41,7 @@ ImagingPlane::ImagingPlane(Plane plane, const ImagingScene& scene, Events events
   setAccessibleName(title_of(plane));
   setFocusPolicy(Qt::StrongFocus);
   setMouseTracking(true);
-  setToolTip(
-      tr("Left button: move the crosshair. Double click or Enter: keep the bone there. Right button: drag the window. "
-         "Wheel or page keys: through the slices."));
+  setToolTip(tr("Left: crosshair. Double click, Enter: keep. Right drag: window. Wheel: slices."));
   slider_ = new QSlider(Qt::Vertical);
   slider_->setObjectName(QString("slice_") + name_of(plane));
   slider_->setAccessibleName(tr("%1: slice").arg(title_of(plane)));

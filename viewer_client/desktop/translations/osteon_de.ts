@@ -389,10 +389,6 @@
         <translation>%1: %2, %3 cm³</translation>
     </message>
     <message>
-        <source>Open the folder of a CT, a CD, or a file: a zip or ISO image, NIfTI, NRRD, MetaImage or InVesalius.</source>
-        <translation>Öffnen Sie den Ordner eines CT, eine CD oder eine Datei: ein Zip- oder ISO-Abbild, NIfTI, NRRD, MetaImage oder InVesalius.</translation>
-    </message>
-    <message>
         <source>Series of the CT</source>
         <translation>Serien des CT</translation>
     </message>
@@ -482,7 +478,7 @@
     </message>
     <message>
         <source>Puts a seed there, from which the bone grows. Two seeds in one part separate it.</source>
-        <translation>Setzt dort einen Saatpunkt, aus dem der Knochen wächst. Zwei Saatpunkte in einem Teil trennen ihn.</translation>
+        <translation>Setzt einen Saatpunkt für den Knochen. Zwei in einem Teil trennen ihn.</translation>
     </message>
     <message>
         <source>&amp;Undo the edit</source>
@@ -534,7 +530,7 @@
     </message>
     <message>
         <source>Double-click a bone, or tick it in the list, and make it.</source>
-        <translation>Doppelklicken Sie auf einen Knochen oder haken Sie ihn in der Liste an, und erzeugen Sie ihn.</translation>
+        <translation>Knochen doppelklicken oder in der Liste anhaken, dann erzeugen.</translation>
     </message>
     <message>
         <source>%1 HU at %2, %3, %4 mm</source>
@@ -572,6 +568,10 @@
         <source>The bone is being made</source>
         <translation>Der Knochen wird erzeugt</translation>
     </message>
+    <message>
+        <source>Open the folder of a CT, a CD, or a file: zip, ISO, NIfTI, NRRD or MetaImage.</source>
+        <translation>Öffnen Sie einen Ordner, eine CD oder eine Datei: Zip, ISO, NIfTI, NRRD, MetaImage.</translation>
+    </message>
 </context>
 <context>
     <name>ImagingPlane</name>
@@ -588,16 +588,16 @@
         <translation>Axiale Ebene</translation>
     </message>
     <message>
-        <source>Left button: move the crosshair. Double click or Enter: keep the bone there. Right button: drag the window. Wheel or page keys: through the slices.</source>
-        <translation>Linke Taste: Fadenkreuz bewegen. Doppelklick oder Eingabetaste: den Knochen dort behalten. Rechte Taste: Fenster ziehen. Rad oder Bildtasten: durch die Schichten.</translation>
-    </message>
-    <message>
         <source>%1: slice</source>
         <translation>%1: Schicht</translation>
     </message>
     <message>
         <source>%1, %2 of %3</source>
         <translation>%1, %2 von %3</translation>
+    </message>
+    <message>
+        <source>Left: crosshair. Double click, Enter: keep. Right drag: window. Wheel: slices.</source>
+        <translation>Links: Fadenkreuz. Doppelklick, Eingabe: behalten. Rechts: Fenster. Rad: Schichten.</translation>
     </message>
 </context>
 <context>
