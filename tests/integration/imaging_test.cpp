@@ -18,11 +18,11 @@
 #include <array>
 #include <cmath>
 #include <filesystem>
-#include <numbers>
 #include <string>
 
 #include "common/volume/case.hpp"
 #include "server/import/dicom_writer.hpp"
+#include "tests/integration/two_balls.hpp"
 #include "tests/integration/window_bench.hpp"
 #include "tests/support/content.hpp"
 #include "tests/support/process.hpp"
@@ -37,25 +37,8 @@ namespace {
 namespace fs = std::filesystem;
 using namespace std::chrono_literals;
 using test::children;
-
-constexpr double kBall_mm = 8.0, kApart_mm = 14.0;  // radius, and distance of a centre from the middle
-constexpr std::int16_t kBone_hu = 1000, kMuscle_hu = 40;
-
-// Two balls of bone in muscle, left and right of the middle, on voxels that are not cubes.
-imaging::HuVolume two_balls() {
-  imaging::HuVolume scan;
-  scan.dims = {60, 60, 24};
-  scan.spacing_mm = {0.9, 0.9, 1.5};
-  scan.origin_mm = -0.5 * scan.spacing_mm.cwiseProduct(Vec3(59, 59, 23));
-  for (int k = 0; k < scan.dims[2]; ++k)
-    for (int j = 0; j < scan.dims[1]; ++j)
-      for (int i = 0; i < scan.dims[0]; ++i) {
-        const Vec3 at = scan.position_mm(Vec3(i, j, k));
-        const bool bone = (Vec3(std::abs(at.x()), at.y(), at.z()) - Vec3(kApart_mm, 0, 0)).norm() <= kBall_mm;
-        scan.values.push_back(bone ? kBone_hu : kMuscle_hu);
-      }
-  return scan;
-}
+using test::kApart_mm;
+using test::two_balls;
 
 class ImagingTest : public test::WindowBench {
  protected:
@@ -133,7 +116,6 @@ class FolderChooser : public QObject {
       auto* dialog = qobject_cast<QFileDialog*>(QApplication::activeModalWidget());
       if (dialog == nullptr) return;
       timer_.stop();
-      dialog->setDirectory(folder_);
       dialog->selectFile(folder_);
       QMetaObject::invokeMethod(dialog, "accept", Qt::QueuedConnection);
     });
@@ -178,8 +160,7 @@ TEST_F(ImagingTest, FromAFolderToADrillableBoneInTenClicks) {
   const fs::path made = cases_folder() / "ct";
   const auto bone = Case::load(made);
   ASSERT_TRUE(bone) << bone.error().message;
-  const double ball_mm3 = 4.0 / 3.0 * std::numbers::pi * std::pow(kBall_mm, 3);
-  EXPECT_NEAR(bone->volume_mm3(), ball_mm3, 0.05 * ball_mm3);
+  EXPECT_NEAR(bone->volume_mm3(), test::kBall_mm3, 0.05 * test::kBall_mm3);
 
   // The same edit list gives the same case.
   const fs::path edits = made.string() + ".edits.yaml", again = desk_->temp() / "again";
