@@ -104,14 +104,17 @@ void MainWindow::import_scan(const QString& source) {
 
 void MainWindow::choose_scan() {
   if (is_busy()) return;
-  leave_room();
-  pages_->setCurrentWidget(imaging_);
-  imaging_->setFocus();
+  if (!practice_ && !room_) return pages_->setCurrentWidget(imaging_);
+  // Nobody leaves a room before a scan is chosen.
+  const QString folder = QFileDialog::getExistingDirectory(this, tr("The folder of a CT"));
+  if (!folder.isEmpty()) process_images(folder);
 }
 
 void MainWindow::process_images(const QString& source) {
-  choose_scan();
-  if (pages_->currentWidget() == imaging_) imaging_->open_source(source);
+  if (is_busy()) return;
+  leave_room();
+  pages_->setCurrentWidget(imaging_);
+  imaging_->open_source(source);
 }
 
 void MainWindow::make_imaging_page() {

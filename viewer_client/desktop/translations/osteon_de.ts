@@ -1242,6 +1242,10 @@
         <source>A click places this tool. It has neither wear nor force law.</source>
         <translation>Ein Klick setzt dieses Werkzeug. Es hat weder Verschleiß noch Kraftgesetz.</translation>
     </message>
+    <message>
+        <source>The folder of a CT</source>
+        <translation>Ordner eines CT</translation>
+    </message>
 </context>
 <context>
     <name>PracticeRoom</name>
