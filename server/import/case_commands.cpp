@@ -311,7 +311,10 @@ Result<std::string> run_series(const CaseArguments& a, const StopSignal& stop) {
   if (Result<void> scan = check_no_case_file(a.input); !scan) return tl::unexpected(scan.error());
   if (const std::string_view one = name_of_one_scan(a.input, searching); !one.empty())
     return bad_input(a.input + " is " + std::string(one) + " with one scan; give it to osteon-import ct");
-  const auto report = list_dicom_series(a.input, searching);
+  if (!a.out.empty())
+    if (auto is_free = check_free(a.out); !is_free) return tl::unexpected(is_free.error());
+  const auto report =
+      a.out.empty() ? list_dicom_series(a.input, searching) : draw_dicom_series(a.input, a.out, searching);
   if (!report) return tl::unexpected(report.error());
   return a.json ? list_json(*report) : list_text(*report);
 }
@@ -675,6 +678,7 @@ void add_case_commands(CLI::App& app, std::vector<Command>& commands) {
   CLI::App* series = app.add_subcommand("series", "List the CT series of a folder, zip or ISO image");
   series->add_option("INPUT", a.input, "Folder (with all its subfolders), zip or ISO image")->required();
   series->add_flag("--json", a.json, "For programs");
+  series->add_option("--pictures", a.out, "Folder, made by this command: the middle slice of each series as PNG");
   commands.push_back({series, [shared](const StopSignal& stop) { return run_series(*shared, stop); }});
 
   CLI::App* labels =

@@ -23,6 +23,7 @@ struct Command {
 };
 
 void add_case_commands(CLI::App& app, std::vector<Command>& commands);       // make and describe cases
+void add_scan_commands(CLI::App& app, std::vector<Command>& commands);       // show a scan before it is a case
 void add_case_file_commands(CLI::App& app, std::vector<Command>& commands);  // pack a case, and unpack it
 void add_registration_command(CLI::App& app, std::vector<Command>& commands);
 void add_subvolume_command(CLI::App& app, std::vector<Command>& commands);

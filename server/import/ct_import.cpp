@@ -49,11 +49,15 @@ Result<ScanRegion> dense_region(const imaging::HuVolume& volume, const CtOptions
   return region_around(first, last, volume, options);
 }
 
-Result<std::vector<int>> islands_to_keep(const CtOptions& options, const std::vector<imaging::Island>& islands,
-                                         const std::vector<imaging::IslandNature>& natures) {
+std::vector<int> all_of(const std::vector<imaging::Island>& islands) {
   std::vector<int> all(islands.size());
   std::iota(all.begin(), all.end(), 1);
-  if (options.keep_all) return all;
+  return all;
+}
+
+Result<std::vector<int>> islands_to_keep(const CtOptions& options, const std::vector<imaging::Island>& islands,
+                                         const std::vector<imaging::IslandNature>& natures) {
+  if (options.keep_all) return all_of(islands);
   if (options.keep.empty()) {
     const auto bone = std::ranges::find(natures, imaging::IslandKind::bone, &imaging::IslandNature::kind);
     const bool has_contrast =
@@ -286,7 +290,8 @@ Result<Segmented> segment(imaging::HuVolume scan, const CtOptions& options, cons
     if (!views) return tl::unexpected(views.error());
     s.found.views = std::move(*views);
   }
-  s.bones = imaging::number_bones(*islands, *kept, options.merge, s.volume.dims);
+  s.bones = imaging::number_bones(*islands, options.number_islands ? all_of(islands->list) : *kept, options.merge,
+                                  s.volume.dims);
   s.found.merged = options.merge;
   s.found.separated = options.separate;
   std::vector<imaging::BoneSeed> seeds;
@@ -339,6 +344,12 @@ Result<Segmented> find_bones(CtScan& scan, CtOptions& options, const DensityCali
   return s;
 }
 
+CaseScan numbered_islands(const Segmented& s) {
+  const imaging::HuVolume& v = s.volume;
+  return {.geometry = {v.dims, v.origin_mm, v.directions * v.spacing_mm.asDiagonal()},
+          .labels = SparseBytes(s.bones.values)};
+}
+
 Result<CtImport> import_bones(CtScan scan, CtOptions options, const KeepGoing& keep_going) {
   const imaging::HuVolume geometry = without_values(scan.volume);
   const double pitch_mm = pitch_mm_of(geometry, options);
@@ -351,7 +362,10 @@ Result<CtImport> import_bones(CtScan scan, CtOptions options, const KeepGoing& k
     s->found.region = imaging::enclosing_box(geometry, Vec3::Zero(),
                                              Vec3(geometry.dims[0] - 1, geometry.dims[1] - 1, geometry.dims[2] - 1));
   if (options.list_only)
-    return CtImport{.found = std::move(s->found), .bone = {}, .scan = {}, .calibration_text = calibrated->text};
+    return CtImport{.found = std::move(s->found),
+                    .bone = {},
+                    .scan = options.number_islands ? numbered_islands(*s) : CaseScan(),
+                    .calibration_text = calibrated->text};
   give_back_freed_memory();
   const auto lattice = lattice_around(s->volume, s->first, s->last, pitch_mm);
   if (!lattice) return tl::unexpected(lattice.error());

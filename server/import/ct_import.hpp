@@ -53,6 +53,7 @@ struct CtOptions {
   std::string edits_file;        // their name, for errors
   bool list_only = false;        // find the islands and make no case
   bool draw_islands = false;     // for a report
+  bool number_islands = false;   // with list_only: CtImport::scan gets their numbers
   // Taken out of the scan before anything else: outliers by a median, then noise by a Gaussian.
   std::optional<imaging::MedianBox> median;
   double gaussian_mm = 0.0;  // its sigma; 0: none
@@ -97,7 +98,7 @@ struct CtSegmentation {
 struct CtImport {
   CtSegmentation found;
   std::optional<Case> bone;           // empty only if the islands were only listed
-  CaseScan scan;                      // of `bone`
+  CaseScan scan;                      // of `bone`; of islands that were numbered, where they lie, and their numbers
   std::string calibration_text = {};  // see ScanCalibration
   PlacedLabels labels = {};           // of a label map, without their voxels
 };

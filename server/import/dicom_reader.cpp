@@ -10,11 +10,13 @@
 #include <system_error>
 #include <vector>
 
+#include "common/runtime/new_folder.hpp"
 #include "server/import/archive_files.hpp"
 #include "server/import/dicom_pixels.hpp"
 #include "server/import/dicom_series.hpp"
 #include "server/import/import_steps.hpp"
 #include "server/import/isolated_reader.hpp"
+#include "server/import/slice_images.hpp"
 
 namespace osteon::import {
 namespace {
@@ -273,6 +275,57 @@ Result<std::size_t> choose(const Survey& s, std::optional<int> number) {
   return choose_series(s.series, s.input.found, s.report.skipped, number, s.input.named_file);
 }
 
+Result<SeriesReport> report_of(Survey found) {
+  const auto chosen = choose(found, {});
+  if (!chosen) return tl::unexpected(chosen.error());
+  SeriesReport report = std::move(found.report);
+  if (!found.series[*chosen].fault) report.taken = found.series[*chosen].entry.number;
+  return report;
+}
+
+// The HU of the slice in the middle. Errors: invalid_input (damaged), cancelled.
+Result<std::vector<std::int16_t>> middle_slice(const CtSeries& series, const FoundFiles& found,
+                                               const KeepGoing& keep_going) {
+  const DicomHeader& header = series.slices[series.slices.size() / 2];
+  std::vector<std::int16_t> hu(static_cast<std::size_t>(series.entry.columns) *
+                               static_cast<std::size_t>(series.entry.rows));
+  IsolatedWork work;
+  work.run = [&](ChildChannel& channel) -> Result<void> {
+    silence_library();
+    PixelReader reader;
+    if (auto read = reader.read(header, found.files[header.file].path, found.shown(header.file), hu); !read)
+      return read;
+    channel.send({reinterpret_cast<const char*>(hu.data()), hu.size() * sizeof(std::int16_t)});
+    return {};
+  };
+  work.on_message = [&](std::string_view message) {
+    if (message.size() != hu.size() * sizeof(std::int16_t)) return false;
+    std::memcpy(hu.data(), message.data(), message.size());
+    return true;
+  };
+  const IsolatedEnd end = run_isolated(work, keep_going);
+  if (!end.result) return tl::unexpected(end.result.error());
+  return hu;
+}
+
+// Errors: internal (disk), cancelled.
+Result<void> draw_all(const Survey& survey, const fs::path& folder, const KeepGoing& keep_going) {
+  const auto count = static_cast<double>(survey.series.size());
+  double done = 0.0;
+  for (const CtSeries& series : survey.series) {
+    if (!keep_going(done / count)) return stopped_while("drawing the series");
+    const auto hu =
+        series.fault ? Result<std::vector<std::int16_t>>()
+                     : middle_slice(series, survey.input.found, part(keep_going, done / count, (done + 1.0) / count));
+    done += 1.0;
+    if (!hu && hu.error().code == ErrorCode::cancelled) return tl::unexpected(hu.error());
+    if (!hu || hu->empty()) continue;
+    const fs::path file = folder / ("series-" + std::to_string(series.entry.number) + ".png");
+    if (auto written = write_slice_image(*hu, series.entry.columns, imaging::Window{}, file); !written) return written;
+  }
+  return {};
+}
+
 }  // namespace
 
 Result<CtScan> read_dicom_series(const fs::path& input, const SeriesOptions& options, const KeepGoing& keep_going) {
@@ -301,11 +354,16 @@ Result<CtScan> read_dicom_series(const fs::path& input, const SeriesOptions& opt
 Result<SeriesReport> list_dicom_series(const fs::path& input, const KeepGoing& keep_going) {
   auto found = survey(input, keep_going);
   if (!found) return tl::unexpected(found.error());
-  const auto chosen = choose(*found, {});
-  if (!chosen) return tl::unexpected(chosen.error());
-  SeriesReport report = std::move(found->report);
-  if (!found->series[*chosen].fault) report.taken = found->series[*chosen].entry.number;
-  return report;
+  return report_of(std::move(*found));
+}
+
+Result<SeriesReport> draw_dicom_series(const fs::path& input, const fs::path& folder, const KeepGoing& keep_going) {
+  auto found = survey(input, keep_going);
+  if (!found) return tl::unexpected(found.error());
+  auto written = write_new_folder(
+      folder, [&](const fs::path& partial) { return draw_all(*found, partial, part(keep_going, kHeadersEnd, 1.0)); });
+  if (!written) return tl::unexpected(written.error());
+  return report_of(std::move(*found));
 }
 
 }  // namespace osteon::import

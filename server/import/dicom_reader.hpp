@@ -30,4 +30,10 @@ struct SeriesOptions {
 // The series from which the same call would choose, without reading pixels. `taken` is 0 if none can be imported.
 [[nodiscard]] Result<SeriesReport> list_dicom_series(const std::filesystem::path& input, const KeepGoing& keep_going);
 
+// The same. Makes the folder, which must not exist, with series-N.png for each series N that can be imported: its
+// middle slice in the window of bone. A series of which that slice cannot be read has no picture. Errors: those above,
+// exists.
+[[nodiscard]] Result<SeriesReport> draw_dicom_series(const std::filesystem::path& input,
+                                                     const std::filesystem::path& folder, const KeepGoing& keep_going);
+
 }  // namespace osteon::import

@@ -22,6 +22,7 @@ int main(int argc, char** argv) {
   app.set_help_all_flag("--help-all", "Help for all commands");
   std::vector<import::Command> commands;
   import::add_case_commands(app, commands);
+  import::add_scan_commands(app, commands);
   import::add_case_file_commands(app, commands);
   import::add_phantom_command(app, commands);
   import::add_registration_command(app, commands);

@@ -92,4 +92,12 @@ Result<void> write_slice_images(imaging::HuVolume volume, const fs::path& folder
       folder, [&](const fs::path& partial) { return write_slices(std::move(volume), partial, options, keep_going); });
 }
 
+Result<void> write_slice_image(std::span<const std::int16_t> hu, int columns, const imaging::Window& window,
+                               const fs::path& file) {
+  std::vector<std::uint8_t> pixels;
+  pixels.reserve(hu.size());
+  for (const std::int16_t value : hu) pixels.push_back(imaging::grey_of(value, window));
+  return write_png(file, columns, static_cast<int>(hu.size()) / columns, pixels.data());
+}
+
 }  // namespace osteon::import

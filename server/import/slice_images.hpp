@@ -1,7 +1,9 @@
 // The slices of a scan as PNG files: its grey values, or its edges.
 #pragma once
+#include <cstdint>
 #include <filesystem>
 #include <optional>
+#include <span>
 
 #include "common/core/keep_going.hpp"
 #include "common/imaging/edges.hpp"
@@ -26,5 +28,9 @@ struct SliceOptions {
 // exhausted (memory), cancelled.
 [[nodiscard]] Result<void> write_slice_images(imaging::HuVolume volume, const std::filesystem::path& folder,
                                               const SliceOptions& options, const KeepGoing& keep_going);
+
+// One slice, row by row. Error: internal (disk).
+[[nodiscard]] Result<void> write_slice_image(std::span<const std::int16_t> hu, int columns,
+                                             const imaging::Window& window, const std::filesystem::path& file);
 
 }  // namespace osteon::import

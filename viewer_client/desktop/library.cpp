@@ -3,6 +3,7 @@
 #include <QCoreApplication>
 #include <QDateTime>
 #include <QFile>
+#include <QFileInfo>
 #include <QJsonDocument>
 #include <QJsonObject>
 #include <QLocale>
@@ -48,6 +49,15 @@ std::vector<ExampleBone> example_bones() {
 std::filesystem::path cases_folder() { return data_folder() / "cases"; }
 
 std::filesystem::path example_folder(const ExampleBone& bone) { return cases_folder() / bone.id.toStdString(); }
+
+std::filesystem::path new_case_folder(const QString& source) {
+  QString name = QFileInfo(source).completeBaseName();
+  if (name.isEmpty() || is_name_of_unpacked(name.toStdString())) name = "case";
+  std::filesystem::path out = cases_folder() / name.toStdString();
+  for (int n = 2; std::filesystem::exists(out); ++n)
+    out = cases_folder() / (name.toStdString() + "-" + std::to_string(n));
+  return out;
+}
 
 std::filesystem::path new_session_folder(const std::filesystem::path& bone) {
   const std::string day = QDateTime::currentDateTime().toString("yyyy-MM-dd-HHmmss").toStdString();

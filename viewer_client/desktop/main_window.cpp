@@ -41,6 +41,7 @@
 #include "viewer_client/desktop/force_menu.hpp"
 #include "viewer_client/desktop/game_pad_controller.hpp"
 #include "viewer_client/desktop/gauges_panel.hpp"
+#include "viewer_client/desktop/imaging_page.hpp"
 #include "viewer_client/desktop/properties_panel.hpp"
 #include "viewer_client/desktop/risk_gauge.hpp"
 #include "viewer_client/desktop/slices_panel.hpp"
@@ -114,6 +115,7 @@ MainWindow::MainWindow() {
                      [this] { return room_ ? room_->people() : std::vector<PersonSeen>(); }});
   pages_->addWidget(start_);
   pages_->addWidget(view_);
+  make_imaging_page();
   setCentralWidget(pages_);
   make_panels();
   make_actions();
@@ -731,6 +733,7 @@ void MainWindow::closeEvent(QCloseEvent* event) {
   settings.setValue("window/geometry", saveGeometry());
   settings.setValue("window/state", saveState());
   if (maker_) maker_->cancel();
+  imaging_->cancel();
   checker_.reset();
   leave_room();
   event->accept();

@@ -31,6 +31,7 @@ class CArmPanel;
 class ClippingPanel;
 class GaugesPanel;
 class GamePadController;
+class ImagingPage;
 class PropertiesPanel;
 class SoundControl;
 class RiskGauge;
@@ -73,6 +74,8 @@ class MainWindow : public QMainWindow {
   // Whether a hand can hold a tool of this name.
   [[nodiscard]] static bool can_hold(const std::string& tool);
   void import_scan(const QString& source);
+  // Opens a folder or file with a CT on the page on which a person chooses its series and bones.
+  void process_images(const QString& source);
 
  protected:
   void closeEvent(QCloseEvent* event) override;
@@ -108,6 +111,7 @@ class MainWindow : public QMainWindow {
   // Makes the case of an example again and goes on with its session. Removes an unpacked case: the user opens its file
   // again.
   void make_anew(const RecentEntry& entry);
+  void make_imaging_page();
   void choose_scan();
   void choose_case();
   void save_bone_as();
@@ -145,6 +149,7 @@ class MainWindow : public QMainWindow {
 
   QStackedWidget* pages_ = nullptr;
   StartPage* start_ = nullptr;
+  ImagingPage* imaging_ = nullptr;
   BoneView* view_ = nullptr;
   SurgeryToolBar* tools_ = nullptr;
   GaugesPanel* gauges_ = nullptr;

@@ -6,6 +6,7 @@
 #include <QTimer>
 #include <utility>
 
+#include "viewer_client/desktop/imaging_page.hpp"
 #include "viewer_client/desktop/main_window.hpp"
 #include "viewer_client/desktop/start_page.hpp"
 
@@ -44,7 +45,7 @@ void MainWindow::open_example(const ExampleBone& bone) {
   make_case(tr("%1 is made now. The next time it opens at once.").arg(bone.title), bone.how, folder);
 }
 
-bool MainWindow::is_busy() const { return maker_ || checker_; }
+bool MainWindow::is_busy() const { return maker_ || checker_ || imaging_->making(); }
 
 void MainWindow::practice_failed(const QString& sentence) {
   const bool joined = room_ && room_->joined();
@@ -98,17 +99,29 @@ void MainWindow::make_anew(const RecentEntry& entry) {
 void MainWindow::import_scan(const QString& source) {
   if (is_busy()) return;
   leave_room();
-  QString name = QFileInfo(source).completeBaseName();
-  if (name.isEmpty() || is_name_of_unpacked(name.toStdString())) name = "case";
-  std::filesystem::path out = data_folder() / "cases" / name.toStdString();
-  for (int n = 2; std::filesystem::exists(out); ++n)
-    out = data_folder() / "cases" / (name.toStdString() + "-" + std::to_string(n));
-  make_case(tr("Importing %1").arg(source), {"ct", source}, out);
+  make_case(tr("Importing %1").arg(source), {"ct", source}, new_case_folder(source));
 }
 
 void MainWindow::choose_scan() {
+  if (is_busy()) return;
+  if (!practice_ && !room_) return pages_->setCurrentWidget(imaging_);
+  // Nobody leaves a room before a scan is chosen.
   const QString folder = QFileDialog::getExistingDirectory(this, tr("The folder of a CT"));
-  if (!folder.isEmpty()) import_scan(folder);
+  if (!folder.isEmpty()) process_images(folder);
+}
+
+void MainWindow::process_images(const QString& source) {
+  if (is_busy()) return;
+  leave_room();
+  pages_->setCurrentWidget(imaging_);
+  imaging_->open_source(source);
+}
+
+void MainWindow::make_imaging_page() {
+  imaging_ = new ImagingPage({[this](bool busy) { enable_opening(!busy); },
+                              [this](const std::filesystem::path& bone) { practise(bone); },
+                              [this] { pages_->setCurrentWidget(start_); }});
+  pages_->addWidget(imaging_);
 }
 
 void MainWindow::choose_case() {

@@ -569,6 +569,271 @@
     </message>
 </context>
 <context>
+    <name>ImagingPage</name>
+    <message>
+        <source>table or headrest</source>
+        <translation>Tisch oder Kopfstütze</translation>
+    </message>
+    <message>
+        <source>cast</source>
+        <translation>Gipsverband</translation>
+    </message>
+    <message>
+        <source>metal</source>
+        <translation>Metall</translation>
+    </message>
+    <message>
+        <source>contrast medium</source>
+        <translation>Kontrastmittel</translation>
+    </message>
+    <message>
+        <source>bone</source>
+        <translation>Knochen</translation>
+    </message>
+    <message>
+        <source>%1: %2, %3 cm³</source>
+        <translation>%1: %2, %3 cm³</translation>
+    </message>
+    <message>
+        <source>Series of the CT</source>
+        <translation>Serien des CT</translation>
+    </message>
+    <message>
+        <source>The bone is made.</source>
+        <translation>Der Knochen ist fertig.</translation>
+    </message>
+    <message>
+        <source>Cancelled. Nothing was written.</source>
+        <translation>Abgebrochen. Nichts wurde gespeichert.</translation>
+    </message>
+    <message>
+        <source>Open a &amp;folder…</source>
+        <translation>&amp;Ordner öffnen…</translation>
+    </message>
+    <message>
+        <source>The folder of a CT, or a CD</source>
+        <translation>Der Ordner eines CT oder eine CD</translation>
+    </message>
+    <message>
+        <source>Open a f&amp;ile…</source>
+        <translation>&amp;Datei öffnen…</translation>
+    </message>
+    <message>
+        <source>A zip or ISO image, a NIfTI, NRRD or MetaImage file</source>
+        <translation>Ein Zip- oder ISO-Abbild, eine Datei in NIfTI, NRRD oder MetaImage</translation>
+    </message>
+    <message>
+        <source>Progress</source>
+        <translation>Fortschritt</translation>
+    </message>
+    <message>
+        <source>Cancel</source>
+        <translation>Abbrechen</translation>
+    </message>
+    <message>
+        <source>&amp;Back</source>
+        <translation>&amp;Zurück</translation>
+    </message>
+    <message>
+        <source>To the start page. The scan and your edits stay here.</source>
+        <translation>Zur Startseite. Das CT und Ihre Bearbeitung bleiben hier.</translation>
+    </message>
+    <message>
+        <source>Window of the grey values</source>
+        <translation>Fenster der Grauwerte</translation>
+    </message>
+    <message>
+        <source>For bone</source>
+        <translation>Für Knochen</translation>
+    </message>
+    <message>
+        <source>For soft tissue</source>
+        <translation>Für Weichteile</translation>
+    </message>
+    <message>
+        <source>All values</source>
+        <translation>Alle Werte</translation>
+    </message>
+    <message>
+        <source>Window</source>
+        <translation>Fenster</translation>
+    </message>
+    <message>
+        <source>Threshold of bone</source>
+        <translation>Schwellwert von Knochen</translation>
+    </message>
+    <message>
+        <source> HU</source>
+        <translation> HU</translation>
+    </message>
+    <message>
+        <source>Threshold</source>
+        <translation>Schwellwert</translation>
+    </message>
+    <message>
+        <source>Parts of bone. The ticked ones are kept:</source>
+        <translation>Teile aus Knochen. Die angehakten bleiben:</translation>
+    </message>
+    <message>
+        <source>Parts of bone</source>
+        <translation>Teile aus Knochen</translation>
+    </message>
+    <message>
+        <source>&amp;Keep the bone at the crosshair</source>
+        <translation>Knochen am Faden&amp;kreuz behalten</translation>
+    </message>
+    <message>
+        <source>Puts a seed there, from which the bone grows. Two seeds in one part separate it.</source>
+        <translation>Setzt einen Saatpunkt für den Knochen. Zwei in einem Teil trennen ihn.</translation>
+    </message>
+    <message>
+        <source>&amp;Undo the edit</source>
+        <translation>Bearbeitung &amp;rückgängig</translation>
+    </message>
+    <message>
+        <source>Takes the last edit back</source>
+        <translation>Nimmt die letzte Bearbeitung zurück</translation>
+    </message>
+    <message>
+        <source>&amp;Redo the edit</source>
+        <translation>Bearbeitung &amp;wiederholen</translation>
+    </message>
+    <message>
+        <source>Does it again</source>
+        <translation>Führt sie noch einmal aus</translation>
+    </message>
+    <message>
+        <source>&amp;Make the bone</source>
+        <translation>K&amp;nochen erzeugen</translation>
+    </message>
+    <message>
+        <source>Makes a case of the kept bones, and opens it to practise</source>
+        <translation>Macht aus den behaltenen Knochen einen Fall und öffnet ihn zum Üben</translation>
+    </message>
+    <message>
+        <source>The folder of a CT</source>
+        <translation>Ordner eines CT</translation>
+    </message>
+    <message>
+        <source>The file of a CT</source>
+        <translation>Datei eines CT</translation>
+    </message>
+    <message>
+        <source>Searching %1</source>
+        <translation>%1 wird durchsucht</translation>
+    </message>
+    <message>
+        <source>Choose a series.</source>
+        <translation>Wählen Sie eine Serie.</translation>
+    </message>
+    <message>
+        <source>Reading the series</source>
+        <translation>Die Serie wird gelesen</translation>
+    </message>
+    <message>
+        <source>Finding the parts of bone</source>
+        <translation>Die Teile aus Knochen werden gesucht</translation>
+    </message>
+    <message>
+        <source>Double-click a bone, or tick it in the list, and make it.</source>
+        <translation>Knochen doppelklicken oder in der Liste anhaken, dann erzeugen.</translation>
+    </message>
+    <message>
+        <source>%1 HU at %2, %3, %4 mm</source>
+        <translation>%1 HU bei %2, %3, %4 mm</translation>
+    </message>
+    <message>
+        <source>There is no bone at the crosshair. Move it into a tinted part.</source>
+        <translation>Am Fadenkreuz ist kein Knochen. Bewegen Sie es in einen gefärbten Teil.</translation>
+    </message>
+    <message>
+        <source>Part %1 is kept.</source>
+        <translation>Teil %1 bleibt.</translation>
+    </message>
+    <message>
+        <source>osteon-import is at work. Wait for it, or cancel it.</source>
+        <translation>osteon-import arbeitet. Warten Sie darauf oder brechen Sie es ab.</translation>
+    </message>
+    <message>
+        <source>Choose a threshold that bone reaches.</source>
+        <translation>Wählen Sie einen Schwellwert, den Knochen erreicht.</translation>
+    </message>
+    <message>
+        <source>There is nothing to undo.</source>
+        <translation>Es gibt nichts rückgängig zu machen.</translation>
+    </message>
+    <message>
+        <source>There is nothing to redo.</source>
+        <translation>Es gibt nichts zu wiederholen.</translation>
+    </message>
+    <message>
+        <source>Keep a bone first: double-click it, or tick it in the list.</source>
+        <translation>Behalten Sie erst einen Knochen: durch Doppelklick oder ein Häkchen in der Liste.</translation>
+    </message>
+    <message>
+        <source>The bone is being made</source>
+        <translation>Der Knochen wird erzeugt</translation>
+    </message>
+    <message>
+        <source>Open the folder of a CT, a CD, or a file: zip, ISO, NIfTI, NRRD or MetaImage.</source>
+        <translation>Öffnen Sie einen Ordner, eine CD oder eine Datei: Zip, ISO, NIfTI, NRRD, MetaImage.</translation>
+    </message>
+</context>
+<context>
+    <name>ImagingPlane</name>
+    <message>
+        <source>Coronal plane</source>
+        <translation>Koronale Ebene</translation>
+    </message>
+    <message>
+        <source>Sagittal plane</source>
+        <translation>Sagittale Ebene</translation>
+    </message>
+    <message>
+        <source>Axial plane</source>
+        <translation>Axiale Ebene</translation>
+    </message>
+    <message>
+        <source>%1: slice</source>
+        <translation>%1: Schicht</translation>
+    </message>
+    <message>
+        <source>%1, %2 of %3</source>
+        <translation>%1, %2 von %3</translation>
+    </message>
+    <message>
+        <source>Left: crosshair. Double click, Enter: keep. Right drag: window. Wheel: slices.</source>
+        <translation>Links: Fadenkreuz. Doppelklick, Eingabe: behalten. Rechts: Fenster. Rad: Schichten.</translation>
+    </message>
+</context>
+<context>
+    <name>ImagingSteps</name>
+    <message>
+        <source>CT, %1 slices, %2 × %3 pixels</source>
+        <translation>CT, %1 Schichten, %2 × %3 Pixel</translation>
+    </message>
+    <message>
+        <source>, pitch %1 × %2 × %3 mm</source>
+        <translation>, Abstand %1 × %2 × %3 mm</translation>
+    </message>
+    <message>
+        <source>Series %1</source>
+        <translation>Serie %1</translation>
+    </message>
+    <message>
+        <source>Cannot make the folder %1. Choose a place where you may write.</source>
+        <translation>Der Ordner %1 kann nicht angelegt werden. Wählen Sie einen beschreibbaren Ort.</translation>
+    </message>
+    <message>
+        <source>%1 has no CT series. Open another folder or file.</source>
+        <translation>%1 hat keine CT-Serie. Öffnen Sie einen anderen Ordner oder eine andere Datei.</translation>
+    </message>
+    <message>
+        <source>Cannot write %1. Is the disk full?</source>
+        <translation>%1 kann nicht geschrieben werden. Ist die Platte voll?</translation>
+    </message>
+</context>
+<context>
     <name>ImporterRun</name>
     <message>
         <source>Cannot make the folder %1. Choose a place where you may write.</source>
@@ -790,10 +1055,6 @@
     <message>
         <source>Importing %1</source>
         <translation>%1 wird importiert</translation>
-    </message>
-    <message>
-        <source>The folder of a CT</source>
-        <translation>Ordner eines CT</translation>
     </message>
     <message>
         <source>Join a room</source>
@@ -1194,6 +1455,10 @@
     <message>
         <source>C-arm</source>
         <translation>C-Bogen</translation>
+    </message>
+    <message>
+        <source>The folder of a CT</source>
+        <translation>Ordner eines CT</translation>
     </message>
 </context>
 <context>

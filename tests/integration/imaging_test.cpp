@@ -1,0 +1,351 @@
+// From a folder of DICOM files to a bone to drill, in the window: with the mouse, with nothing typed, and with the case
+// that osteon-import makes of the same edit list.
+#include <gtest/gtest.h>
+
+#include <QApplication>
+#include <QComboBox>
+#include <QFileDialog>
+#include <QLabel>
+#include <QListWidget>
+#include <QPushButton>
+#include <QSettings>
+#include <QSlider>
+#include <QSpinBox>
+#include <QTest>
+#include <QTimer>
+#include <QWheelEvent>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <filesystem>
+#include <string>
+
+#include "common/volume/case.hpp"
+#include "server/import/dicom_writer.hpp"
+#include "tests/integration/two_balls.hpp"
+#include "tests/integration/window_bench.hpp"
+#include "tests/support/content.hpp"
+#include "tests/support/process.hpp"
+#include "tests/support/size_limit.hpp"
+#include "viewer_client/desktop/imaging_page.hpp"
+#include "viewer_client/desktop/language.hpp"
+#include "viewer_client/desktop/library.hpp"
+
+namespace osteon {
+namespace {
+
+namespace fs = std::filesystem;
+using namespace std::chrono_literals;
+using test::children;
+using test::kApart_mm;
+using test::two_balls;
+
+class ImagingTest : public test::WindowBench {
+ protected:
+  void SetUp() override {
+    QSettings().setValue("tour/seen", true);
+    speak("en");
+    WindowBench::SetUp();
+  }
+  // A folder of DICOM files, written once for each name.
+  [[nodiscard]] static fs::path series(const std::string& name, const imaging::HuVolume& scan) {
+    const fs::path folder = desk_->temp() / name;
+    if (!fs::exists(folder)) {
+      const auto written = import::write_dicom_series(scan, folder, [](double) { return true; });
+      EXPECT_TRUE(written) << written.error().message;
+    }
+    return folder;
+  }
+  template <class Widget>
+  [[nodiscard]] Widget& part(const char* name) const {
+    auto* found = window_->findChild<Widget*>(name);
+    if (found == nullptr) ADD_FAILURE() << name;
+    return *found;
+  }
+  [[nodiscard]] ImagingPlane& plane(const char* name) const {
+    auto* found = dynamic_cast<ImagingPlane*>(window_->findChild<QWidget*>(name));
+    if (found == nullptr) ADD_FAILURE() << name;
+    return *found;
+  }
+  [[nodiscard]] QListWidget& islands() const { return part<QListWidget>("islands"); }
+  [[nodiscard]] bool idle() const { return !part<QPushButton>("imaging_cancel").isVisible(); }
+  [[nodiscard]] bool found(int count) const { return idle() && islands().isVisible() && islands().count() == count; }
+  void click(const char* button) {
+    ASSERT_TRUE(part<QPushButton>(button).isEnabled()) << button;
+    ++clicks_;
+    QTest::mouseClick(&part<QPushButton>(button), Qt::LeftButton);
+  }
+  // Opens the folder as by the dialog, and its first series.
+  void open_scan(const fs::path& folder, int parts) {
+    window_->process_images(QString::fromStdString(folder.string()));
+    auto& list = part<QListWidget>("series");
+    ASSERT_TRUE(until([&] { return list.isVisible() && list.count() == 1; })) << words();
+    choose_series(list);
+    ASSERT_TRUE(until([&] { return found(parts); })) << words();
+  }
+  void choose_series(QListWidget& list) {
+    ++clicks_;
+    QTest::mouseClick(list.viewport(), Qt::LeftButton, {}, list.visualItemRect(list.item(0)).center());
+  }
+  // The middle voxel of the ball on the patient's left (1) or right (-1).
+  [[nodiscard]] static std::array<int, 3> ball(int side) {
+    const Vec3 voxel = two_balls().voxel(Vec3(side * kApart_mm, 0, 0));
+    return {static_cast<int>(std::lround(voxel.x())), static_cast<int>(std::lround(voxel.y())), 12};
+  }
+  [[nodiscard]] std::string words() const { return label("imaging_words").toStdString(); }
+  [[nodiscard]] std::vector<bool> ticks() const {
+    std::vector<bool> all;
+    for (int i = 0; i < islands().count(); ++i) all.push_back(islands().item(i)->checkState() == Qt::Checked);
+    return all;
+  }
+  // The step has ended with one sentence, and another scan can be opened.
+  [[nodiscard]] std::string refused() {
+    EXPECT_TRUE(until([&] { return idle() && !words().empty(); }));
+    EXPECT_EQ(words().find('\n'), std::string::npos) << words();
+    EXPECT_TRUE(part<QPushButton>("imaging_folder").isEnabled());
+    return words();
+  }
+  int clicks_ = 0;
+};
+
+// Chooses a folder in the next dialog, as two clicks do.
+class FolderChooser : public QObject {
+ public:
+  explicit FolderChooser(QString folder) : folder_(std::move(folder)) {
+    connect(&timer_, &QTimer::timeout, this, [this] {
+      auto* dialog = qobject_cast<QFileDialog*>(QApplication::activeModalWidget());
+      if (dialog == nullptr) return;
+      timer_.stop();
+      dialog->selectFile(folder_);
+      QMetaObject::invokeMethod(dialog, "accept", Qt::QueuedConnection);
+    });
+    timer_.start(20);
+  }
+
+ private:
+  QString folder_;
+  QTimer timer_;
+};
+
+TEST_F(ImagingTest, FromAFolderToADrillableBoneInTenClicks) {
+  const fs::path folder = series("ct", two_balls());
+  click("import");
+  {
+    const FolderChooser chooser(QString::fromStdString(folder.string()));
+    click("imaging_folder");
+    clicks_ += 2;  // in the dialog
+  }
+  auto& list = part<QListWidget>("series");
+  ASSERT_TRUE(until([&] { return list.isVisible() && list.count() == 1; })) << words();
+  const QString text = list.item(0)->text();
+  EXPECT_TRUE(text.contains("CT, 24 slices, 60 × 60 pixels, pitch 0.9 × 0.9 × 1.5 mm")) << text.toStdString();
+  EXPECT_FALSE(list.item(0)->icon().isNull());
+  EXPECT_FALSE(list.item(0)->icon().availableSizes().isEmpty());
+  choose_series(list);
+  ASSERT_TRUE(until([&] { return found(2); })) << words();
+  EXPECT_FALSE(part<QPushButton>("make_bone").isEnabled());
+
+  // The ball on the patient's left is on the right of the axial plane.
+  ImagingPlane& axial = plane("plane_axial");
+  const QPoint at = axial.pixel(ball(1));
+  EXPECT_GT(at.x(), axial.width() / 2);
+  double_click(axial, at);
+  clicks_ += 2;
+  EXPECT_EQ(std::ranges::count(ticks(), true), 1);
+  click("make_bone");
+  ASSERT_TRUE(until([&] { return view_->surface_shown(); })) << words() << problem();
+  EXPECT_LE(clicks_, 10);
+
+  // One ball and not the other, as large as the formula says. Voxels of 1 mm show its volume to within 5 %.
+  const fs::path made = cases_folder() / "ct";
+  const auto bone = Case::load(made);
+  ASSERT_TRUE(bone) << bone.error().message;
+  EXPECT_NEAR(bone->volume_mm3(), test::kBall_mm3, 0.05 * test::kBall_mm3);
+
+  // The same edit list gives the same case.
+  const fs::path edits = made.string() + ".edits.yaml", again = desk_->temp() / "again";
+  const auto run = test::run(test::program("osteon-import"), {"ct", folder.string(), "--series", "1", "--threshold",
+                                                              "226", "--edits", edits.string(), "--out", again});
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  const auto repeated = Case::load(again);
+  ASSERT_TRUE(repeated) << repeated.error().message;
+  EXPECT_EQ(repeated->hash(), bone->hash());
+  drill();
+}
+
+TEST_F(ImagingTest, ThePlanesHangTogether) {
+  open_scan(series("ct", two_balls()), 2);
+  ImagingPlane &axial = plane("plane_axial"), &coronal = plane("plane_coronal"), &sagittal = plane("plane_sagittal");
+  QTest::mouseClick(&axial, Qt::LeftButton, {}, axial.pixel(ball(-1)));
+  EXPECT_EQ(axial.slice(), 12);
+  EXPECT_EQ(coronal.slice(), ball(-1)[1]);
+  EXPECT_EQ(sagittal.slice(), ball(-1)[0]);
+  EXPECT_TRUE(label("readout").startsWith("1000 HU at -1")) << label("readout").toStdString();
+  EXPECT_TRUE(label("readout").contains("bone")) << label("readout").toStdString();
+  // Between the balls.
+  QTest::mouseClick(&axial, Qt::LeftButton, {}, axial.pixel({29, 29, 12}));
+  EXPECT_TRUE(label("readout").startsWith("40 HU")) << label("readout").toStdString();
+  // Wheel, slider and keys go through the slices.
+  QWheelEvent wheel(QPointF(40, 40), coronal.mapToGlobal(QPoint(40, 40)), {}, {0, 240}, Qt::NoButton, {},
+                    Qt::NoScrollPhase, false);
+  QApplication::sendEvent(&coronal, &wheel);
+  EXPECT_EQ(coronal.slice(), 31);
+  part<QSlider>("slice_axial").setValue(3);
+  EXPECT_EQ(axial.slice(), 3);
+  QTest::keyClick(&axial, Qt::Key_PageUp);
+  EXPECT_EQ(axial.slice(), 4);
+  QTest::keyClick(&axial, Qt::Key_Left);
+  EXPECT_EQ(sagittal.slice(), 28);
+}
+
+TEST_F(ImagingTest, TheRightButtonDragsTheWindowAndPresetsBringItBack) {
+  open_scan(series("ct", two_balls()), 2);
+  ImagingPlane& axial = plane("plane_axial");
+  auto& preset = part<QComboBox>("window_preset");
+  EXPECT_EQ(preset.currentIndex(), 0);
+  // Between two balls and away from crosshair and letters.
+  const QPoint muscle = axial.pixel({29, 20, 12}) + QPoint(-3, 0);
+  const auto grey = [&] { return qGray(axial.grab().toImage().pixel(muscle)); };
+  // 40 HU in the window 400 +- 900: (40 - 399.5) / 1799 + 0.5 of white.
+  EXPECT_NEAR(grey(), 255.0 * ((40.0 - 399.5) / 1799.0 + 0.5), 1.5);
+  QTest::mousePress(&axial, Qt::RightButton, {}, muscle);
+  QMouseEvent drag(QEvent::MouseMove, muscle + QPoint(0, 40), Qt::NoButton, Qt::RightButton, {});
+  QApplication::sendEvent(&axial, &drag);
+  QTest::mouseRelease(&axial, Qt::RightButton, {}, muscle + QPoint(0, 40));
+  EXPECT_EQ(preset.currentIndex(), -1);
+  // Each of 40 pixels raises the centre by a four-hundredth of the width: 180 HU.
+  EXPECT_NEAR(grey(), 255.0 * ((40.0 - 579.5) / 1799.0 + 0.5), 1.5);
+  preset.setCurrentIndex(1);
+  emit preset.activated(1);
+  // Of soft tissue, 40 +- 200, it is the centre.
+  EXPECT_NEAR(grey(), 127.5, 1.5);
+}
+
+TEST_F(ImagingTest, EverythingCanBeUndoneAndDoneAgain) {
+  open_scan(series("ct", two_balls()), 2);
+  const std::vector<bool> none{false, false}, first{true, false}, both{true, true};
+  EXPECT_EQ(ticks(), none);
+  islands().item(0)->setCheckState(Qt::Checked);
+  islands().item(1)->setCheckState(Qt::Checked);
+  EXPECT_EQ(ticks(), both);
+  click("undo_edit");
+  EXPECT_EQ(ticks(), first);
+  QTest::keySequence(window_.get(), QKeySequence::Undo);
+  EXPECT_EQ(ticks(), none);
+  EXPECT_FALSE(part<QPushButton>("undo_edit").isEnabled());
+  EXPECT_FALSE(part<QPushButton>("make_bone").isEnabled());
+  click("redo_edit");
+  click("redo_edit");
+  EXPECT_EQ(ticks(), both);
+  islands().item(0)->setCheckState(Qt::Unchecked);
+  EXPECT_EQ(ticks(), (std::vector<bool>{false, true}));
+  EXPECT_FALSE(part<QPushButton>("redo_edit").isEnabled());
+  // A threshold above both, and back: the seeds are still there.
+  part<QSpinBox>("threshold").setValue(1500);
+  ASSERT_TRUE(until([&] { return idle() && words().find("1500") != std::string::npos; })) << words();
+  click("undo_edit");
+  EXPECT_TRUE(until([&] { return found(2) && ticks() == std::vector<bool>({false, true}); })) << words();
+  EXPECT_TRUE(part<QPushButton>("make_bone").isEnabled());
+}
+
+TEST_F(ImagingTest, WhatIsNoCtIsRefusedWithOneSentence) {
+  const fs::path empty = desk_->temp() / "empty";
+  fs::create_directories(empty);
+  window_->process_images(QString::fromStdString(empty.string()));
+  EXPECT_NE(refused().find(empty.string()), std::string::npos) << words();
+  window_->process_images(QString::fromStdString((desk_->temp() / "nowhere").string()));
+  EXPECT_NE(refused().find("nowhere"), std::string::npos) << words();
+
+  // One slice is listed with what is wrong, and cannot be chosen.
+  const fs::path one = series("one", two_balls());
+  std::vector<fs::path> files;
+  for (const auto& entry : fs::directory_iterator(one)) files.push_back(entry.path());
+  for (std::size_t i = 1; i < files.size(); ++i) fs::remove(files[i]);
+  window_->process_images(QString::fromStdString(one.string()));
+  auto& list = part<QListWidget>("series");
+  ASSERT_TRUE(until([&] { return idle() && list.isVisible() && list.count() == 1; })) << words();
+  EXPECT_FALSE(list.item(0)->flags() & Qt::ItemIsEnabled) << list.item(0)->text().toStdString();
+
+  // Air is seen, and has no bone.
+  imaging::HuVolume air = two_balls();
+  air.values.assign(air.count(), -1000);
+  window_->process_images(QString::fromStdString(series("air", air).string()));
+  ASSERT_TRUE(until([&] { return idle() && list.isVisible() && list.count() == 1; })) << words();
+  choose_series(list);
+  ASSERT_TRUE(until([&] { return idle() && islands().isVisible(); })) << words();
+  EXPECT_NE(refused().find("threshold"), std::string::npos) << words();
+  EXPECT_FALSE(part<QPushButton>("make_bone").isEnabled());
+  // A good one afterwards.
+  open_scan(series("ct", two_balls()), 2);
+}
+
+TEST_F(ImagingTest, AFullDiskLosesNoEdits) {
+  const auto cases = [] { return test::names_in(cases_folder()); };
+  open_scan(series("ct", two_balls()), 2);
+  islands().item(0)->setCheckState(Qt::Checked);
+  const auto before = cases();
+  {
+    const test::SizeLimit full(2000);
+    click("make_bone");
+    EXPECT_NE(refused().find("disk"), std::string::npos) << words();
+  }
+  EXPECT_EQ(cases(), before);
+  EXPECT_EQ(ticks(), (std::vector<bool>{true, false}));
+  EXPECT_TRUE(part<QPushButton>("make_bone").isEnabled());
+  {
+    const test::SizeLimit full(50000);
+    window_->process_images(QString::fromStdString(series("ct", two_balls()).string()));
+    auto& list = part<QListWidget>("series");
+    ASSERT_TRUE(until([&] { return list.isVisible() && list.count() == 1; })) << words();
+    choose_series(list);
+    EXPECT_NE(refused().find("disk"), std::string::npos) << words();
+    EXPECT_TRUE(list.isVisible());
+  }
+}
+
+TEST_F(ImagingTest, EachStepCanBeCancelled) {
+  const auto cancel = [&] {
+    EXPECT_TRUE(until([&] { return part<QPushButton>("imaging_cancel").isVisible(); }));
+    click("imaging_cancel");
+    EXPECT_EQ(refused(), "Cancelled. Nothing was written.");
+    EXPECT_TRUE(children("osteon-import").empty());
+  };
+  const QString folder = QString::fromStdString(series("ct", two_balls()).string());
+  window_->process_images(folder);
+  cancel();
+  window_->process_images(folder);
+  auto& list = part<QListWidget>("series");
+  ASSERT_TRUE(until([&] { return idle() && list.isVisible() && list.count() == 1; })) << words();
+  choose_series(list);
+  cancel();
+  EXPECT_TRUE(list.isVisible());
+  choose_series(list);
+  ASSERT_TRUE(until([&] { return found(2); })) << words();
+  part<QSpinBox>("threshold").setValue(300);
+  ASSERT_TRUE(until([&] { return !idle(); }));
+  cancel();
+  click("undo_edit");
+  ASSERT_TRUE(until([&] { return found(2) && islands().isEnabled(); })) << words();
+  islands().item(1)->setCheckState(Qt::Checked);
+  const auto before = test::names_in(cases_folder());
+  click("make_bone");
+  EXPECT_FALSE(part<QPushButton>("imaging_back").isEnabled());
+  cancel();
+  EXPECT_EQ(test::names_in(cases_folder()), before);
+  EXPECT_EQ(ticks(), (std::vector<bool>{false, true}));
+}
+
+TEST_F(ImagingTest, AWindowThatIsClosedLeavesNoScanBehind) {
+  open_scan(series("ct", two_balls()), 2);
+  const auto has_scratch = [] {
+    for (const auto& entry : fs::directory_iterator(cases_folder()))
+      if (entry.path().filename().string().find(".partial-imaging") != std::string::npos) return true;
+    return false;
+  };
+  EXPECT_TRUE(has_scratch());
+  window_.reset();
+  EXPECT_FALSE(has_scratch());
+}
+
+}  // namespace
+}  // namespace osteon

@@ -1,0 +1,103 @@
+// What osteon-import shows of a scan before a case is made of it, as the window asks it.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "server/import/dicom_writer.hpp"
+#include "tests/integration/two_balls.hpp"
+#include "tests/support/content.hpp"
+#include "tests/support/process.hpp"
+#include "tests/support/temp_dir.hpp"
+#include "viewer_client/imaging/island_map.hpp"
+
+namespace osteon::test {
+namespace {
+
+namespace fs = std::filesystem;
+
+class ScanCommands : public testing::Test {
+ protected:
+  void SetUp() override {
+    ASSERT_TRUE(import::write_dicom_series(balls_, folder_ / "ct", [](double) { return true; }));
+  }
+  [[nodiscard]] std::string path(const char* name) const { return (folder_ / name).string(); }
+  static RunResult start(const std::vector<std::string>& arguments) { return run(program("osteon-import"), arguments); }
+  // Exit code 1, one sentence with `named`, and no new file.
+  void refused(const std::vector<std::string>& arguments, const std::string& named) const {
+    const auto before = names_in(folder_.path());
+    const auto result = start(arguments);
+    EXPECT_EQ(result.exit_code, 1) << named;
+    EXPECT_EQ(result.out, "");
+    EXPECT_EQ(std::ranges::count(result.err, '\n'), 1) << result.err;
+    EXPECT_NE(result.err.find(named), std::string::npos) << result.err;
+    EXPECT_EQ(names_in(folder_.path()), before);
+  }
+  TempDir folder_;
+  imaging::HuVolume balls_ = two_balls();
+};
+
+TEST_F(ScanCommands, AScanIsWrittenVoxelForVoxel) {
+  const auto written = start({"export-scan", path("ct"), path("scan.nrrd"), "--series", "1"});
+  ASSERT_EQ(written.exit_code, 0) << written.err;
+  const auto scan = read_scan_file(folder_ / "scan.nrrd");
+  ASSERT_TRUE(scan) << scan.error().message;
+  EXPECT_EQ(scan->geometry.dims, balls_.dims);
+  EXPECT_EQ(scan->values, balls_.values);
+  EXPECT_LT((scan->geometry.origin_mm - balls_.origin_mm).norm(), 1e-6);
+  refused({"export-scan", path("ct"), path("scan.nrrd")}, "scan.nrrd");
+  refused({"export-scan", path("ct"), path("other.nii")}, ".nrrd");
+  refused({"export-scan", path("ct"), path("other.nrrd"), "--series", "2"}, "series");
+}
+
+// Islands are the voxels of the balls, largest first; both have as many. What is listed is what is written.
+TEST_F(ScanCommands, IslandsAreListedAndNumbered) {
+  const auto listed = start({"islands", path("ct"), path("islands.nrrd")});
+  ASSERT_EQ(listed.exit_code, 0) << listed.err;
+  const auto json = nlohmann::json::parse(listed.out);
+  ASSERT_EQ(json["islands"].size(), 2u) << listed.out;
+  EXPECT_EQ(json["count"], 2);
+  EXPECT_EQ(json["threshold_hu"], 226.0);
+  auto numbers = read_number_file(folder_ / "islands.nrrd");
+  ASSERT_TRUE(numbers) << numbers.error().message;
+  ASSERT_EQ(start({"export-scan", path("ct"), path("scan.nrrd")}).exit_code, 0);
+  const auto scan = read_scan_file(folder_ / "scan.nrrd");
+  ASSERT_TRUE(scan);
+  const auto map = IslandMap::make(scan->geometry, std::move(*numbers));
+  ASSERT_TRUE(map) << map.error().message;
+  std::array<int, 3> counts{};
+  for (int k = 0; k < balls_.dims[2]; ++k)
+    for (int j = 0; j < balls_.dims[1]; ++j)
+      for (int i = 0; i < balls_.dims[0]; ++i) {
+        const auto number = map->number({i, j, k});
+        ASSERT_LE(number, 2);
+        ++counts[number];
+        EXPECT_EQ(number != 0, balls_.at(i, j, k) == kBall_hu);
+      }
+  EXPECT_EQ(counts[1], counts[2]);
+  for (const auto& island : json["islands"]) {
+    EXPECT_EQ(island["kind"], "bone");
+    EXPECT_NEAR(island["volume_cm3"].get<double>(), counts[1] * balls_.spacing_mm.prod() * 1e-3, 1e-9);
+    const auto at = island["centre_mm"].get<std::vector<double>>();
+    EXPECT_NEAR(std::abs(at[0]), kApart_mm, 0.5 * balls_.spacing_mm.x());
+    const auto voxel = voxel_of(scan->geometry, Vec3(at[0], at[1], at[2]));
+    ASSERT_TRUE(voxel);
+    EXPECT_EQ(map->number(*voxel), island["number"].get<int>());
+  }
+  refused({"islands", path("ct"), path("none.nrrd"), "--threshold", "1001"}, "threshold");
+}
+
+TEST_F(ScanCommands, EachSeriesHasAPicture) {
+  const auto listed = start({"series", path("ct"), "--json", "--pictures", path("pictures")});
+  ASSERT_EQ(listed.exit_code, 0) << listed.err;
+  EXPECT_EQ(nlohmann::json::parse(listed.out)["series"].size(), 1u);
+  EXPECT_EQ(names_in(folder_ / "pictures"), std::set<std::string>{"series-1.png"});
+  EXPECT_EQ(content(folder_ / "pictures" / "series-1.png").substr(1, 3), "PNG");
+  refused({"series", path("ct"), "--pictures", path("pictures")}, "pictures");
+}
+
+}  // namespace
+}  // namespace osteon::test

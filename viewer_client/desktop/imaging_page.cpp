@@ -1,0 +1,442 @@
+#include "viewer_client/desktop/imaging_page.hpp"
+
+#include <QComboBox>
+#include <QFileDialog>
+#include <QFormLayout>
+#include <QGridLayout>
+#include <QIcon>
+#include <QLabel>
+#include <QListWidget>
+#include <QLocale>
+#include <QProgressBar>
+#include <QPushButton>
+#include <QSignalBlocker>
+#include <QSpinBox>
+#include <QStackedWidget>
+#include <algorithm>
+#include <utility>
+
+#include "viewer_client/desktop/enabled.hpp"
+
+namespace osteon {
+
+namespace {
+
+constexpr int kThresholdPause_ms = 600, kThumbnail_px = 96, kListWidth_px = 250;
+constexpr std::array kPresets{kBoneWindow, kSoftTissueWindow, kWideWindow};
+enum ImagingStackPage { kNothingOpen, kSeriesPage, kWorkPage };
+
+QString kind_text(const std::string& kind) {
+  if (kind == "table") return QCoreApplication::translate("ImagingPage", "table or headrest");
+  if (kind == "cast") return QCoreApplication::translate("ImagingPage", "cast");
+  if (kind == "metal") return QCoreApplication::translate("ImagingPage", "metal");
+  if (kind == "contrast") return QCoreApplication::translate("ImagingPage", "contrast medium");
+  return QCoreApplication::translate("ImagingPage", "bone");
+}
+
+QString island_text(const ListedIsland& island) {
+  return QCoreApplication::translate("ImagingPage", "%1: %2, %3 cm³")
+      .arg(island.number)
+      .arg(kind_text(island.kind), QLocale().toString(island.volume_cm3, 'f', 2));
+}
+
+QIcon colour_icon(const Tint& tint) {
+  QPixmap square(12, 12);
+  square.fill(QColor(tint.red, tint.green, tint.blue));
+  return {square};
+}
+
+}  // namespace
+
+ImagingPage::ImagingPage(Events events, QWidget* parent)
+    : QWidget(parent), events_(std::move(events)), steps_(step_events()) {
+  setObjectName("imaging");
+  setFocusPolicy(Qt::StrongFocus);
+  stack_ = new QStackedWidget;
+  auto* hint = new QLabel(tr("Open the folder of a CT, a CD, or a file: zip, ISO, NIfTI, NRRD or MetaImage."));
+  hint->setWordWrap(true);
+  hint->setAlignment(Qt::AlignCenter);
+  stack_->addWidget(hint);
+  series_list_ = new QListWidget;
+  series_list_->setObjectName("series");
+  series_list_->setAccessibleName(tr("Series of the CT"));
+  series_list_->setIconSize({kThumbnail_px, kThumbnail_px});
+  series_list_->setWordWrap(true);
+  connect(series_list_, &QListWidget::itemClicked, this, [this](QListWidgetItem* item) { read_row(item); });
+  connect(series_list_, &QListWidget::itemActivated, this, [this](QListWidgetItem* item) { read_row(item); });
+  stack_->addWidget(series_list_);
+  auto* work = new QWidget;
+  work->setLayout(make_work());
+  stack_->addWidget(work);
+
+  auto* all = new QVBoxLayout(this);
+  all->addLayout(make_head());
+  all->addWidget(stack_, 1);
+  threshold_timer_.setSingleShot(true);
+  threshold_timer_.setInterval(kThresholdPause_ms);
+  connect(&threshold_timer_, &QTimer::timeout, this, [this] { apply_threshold(); });
+  end_work({});
+}
+
+ImagingSteps::Events ImagingPage::step_events() {
+  return {[this](int percent) {
+            progress_->setRange(0, 100);
+            progress_->setValue(percent);
+          },
+          [this](const std::vector<ListedSeries>& series) { show_series(series); },
+          [this](ShownScan scan) { show_scan(std::move(scan)); },
+          [this](std::vector<ListedIsland> list, IslandMap map) { show_islands(std::move(list), std::move(map)); },
+          [this](const std::filesystem::path& bone) {
+            events_.busy(false);
+            end_work(tr("The bone is made."));
+            events_.made(bone);
+          },
+          [this](const QString& sentence) {
+            events_.busy(false);
+            end_work(sentence.isEmpty() ? tr("Cancelled. Nothing was written.") : sentence);
+            if (!wanted_source_.isEmpty()) return open_source(std::exchange(wanted_source_, {}));
+            if (std::exchange(wants_islands_, false)) find_islands();
+          }};
+}
+
+QPushButton* ImagingPage::add_button(QBoxLayout& to, const QString& words, const char* name, const QString& tip,
+                                     std::function<void()> call) {
+  auto* button = new QPushButton(words);
+  button->setObjectName(name);
+  button->setToolTip(tip);
+  connect(button, &QPushButton::clicked, this, [call = std::move(call)] { call(); });
+  to.addWidget(button);
+  return button;
+}
+
+QBoxLayout* ImagingPage::make_head() {
+  auto* row = new QHBoxLayout;
+  add_button(*row, tr("Open a &folder…"), "imaging_folder", tr("The folder of a CT, or a CD"),
+             [this] { choose_folder(); });
+  add_button(*row, tr("Open a f&ile…"), "imaging_file", tr("A zip or ISO image, a NIfTI, NRRD or MetaImage file"),
+             [this] { choose_file(); });
+  words_ = new QLabel;
+  words_->setObjectName("imaging_words");
+  words_->setWordWrap(true);
+  row->addWidget(words_, 1);
+  progress_ = new QProgressBar;
+  progress_->setAccessibleName(tr("Progress"));
+  row->addWidget(progress_);
+  cancel_ = add_button(*row, tr("Cancel"), "imaging_cancel", {}, [this] { steps_.cancel(); });
+  back_ = add_button(*row, tr("&Back"), "imaging_back", tr("To the start page. The scan and your edits stay here."),
+                     [this] { events_.leave(); });
+  return row;
+}
+
+QBoxLayout* ImagingPage::make_work() {
+  auto* row = new QHBoxLayout;
+  row->setContentsMargins(0, 0, 0, 0);
+  row->addWidget(make_planes(), 1);
+  row->addLayout(make_side());
+  return row;
+}
+
+QWidget* ImagingPage::make_planes() {
+  auto* all = new QWidget;
+  auto* grid = new QGridLayout(all);
+  grid->setContentsMargins(0, 0, 0, 0);
+  for (std::size_t i = 0; i < planes_.size(); ++i) {
+    planes_[i] = new ImagingPlane(kPlanes[i], scene_,
+                                  {[this](const std::array<int, 3>& voxel) { look_at(voxel); },
+                                   [this](const std::array<int, 3>& voxel) { point_at(voxel); },
+                                   [this](const std::array<int, 3>& voxel) { keep_at(voxel); },
+                                   [this](const GreyWindow& window) { change_window(window); }});
+    grid->addWidget(planes_[i], static_cast<int>(i) / 2, static_cast<int>(i) % 2);
+  }
+  readout_ = new QLabel;
+  readout_->setObjectName("readout");
+  readout_->setWordWrap(true);
+  readout_->setAlignment(Qt::AlignTop | Qt::AlignLeft);
+  grid->addWidget(readout_, 1, 1);
+  for (int at = 0; at < 2; ++at) grid->setRowStretch(at, 1), grid->setColumnStretch(at, 1);
+  return all;
+}
+
+QBoxLayout* ImagingPage::make_side() {
+  auto* column = new QVBoxLayout;
+  auto* form = new QFormLayout;
+  preset_ = new QComboBox;
+  preset_->setObjectName("window_preset");
+  preset_->setAccessibleName(tr("Window of the grey values"));
+  preset_->addItems({tr("For bone"), tr("For soft tissue"), tr("All values")});
+  connect(preset_, QOverload<int>::of(&QComboBox::activated), this,
+          [this](int index) { change_window(kPresets[static_cast<std::size_t>(index)]); });
+  form->addRow(tr("Window"), preset_);
+  threshold_ = new QSpinBox;
+  threshold_->setObjectName("threshold");
+  threshold_->setAccessibleName(tr("Threshold of bone"));
+  threshold_->setRange(-1000, 4000);
+  threshold_->setSingleStep(10);
+  threshold_->setSuffix(tr(" HU"));
+  threshold_->setValue(static_cast<int>(history_.now().threshold_hu));
+  connect(threshold_, QOverload<int>::of(&QSpinBox::valueChanged), this, [this](int hu) { preview_threshold(hu); });
+  form->addRow(tr("Threshold"), threshold_);
+  column->addLayout(form);
+  auto* heading = new QLabel(tr("Parts of bone. The ticked ones are kept:"));
+  heading->setWordWrap(true);
+  column->addWidget(heading);
+  island_list_ = new QListWidget;
+  island_list_->setObjectName("islands");
+  island_list_->setAccessibleName(tr("Parts of bone"));
+  island_list_->setFixedWidth(kListWidth_px);
+  connect(island_list_, &QListWidget::itemChanged, this, [this](QListWidgetItem* item) { change_island(item); });
+  column->addWidget(island_list_, 1);
+  keep_ = add_button(*column, tr("&Keep the bone at the crosshair"), "keep_bone",
+                     tr("Puts a seed there, from which the bone grows. Two seeds in one part separate it."),
+                     [this] { keep_at(scene_.crosshair); });
+  undo_ = add_button(*column, tr("&Undo the edit"), "undo_edit", tr("Takes the last edit back"), [this] {
+    history_.undo();
+    follow_edits();
+  });
+  undo_->setShortcut(QKeySequence::Undo);
+  redo_ = add_button(*column, tr("&Redo the edit"), "redo_edit", tr("Does it again"), [this] {
+    history_.redo();
+    follow_edits();
+  });
+  redo_->setShortcut(QKeySequence::Redo);
+  make_ = add_button(*column, tr("&Make the bone"), "make_bone",
+                     tr("Makes a case of the kept bones, and opens it to practise"), [this] { make_bone(); });
+  return column;
+}
+
+void ImagingPage::choose_folder() {
+  const QString folder = QFileDialog::getExistingDirectory(this, tr("The folder of a CT"));
+  if (!folder.isEmpty()) open_source(folder);
+}
+
+void ImagingPage::choose_file() {
+  const QString file = QFileDialog::getOpenFileName(this, tr("The file of a CT"));
+  if (!file.isEmpty()) open_source(file);
+}
+
+void ImagingPage::open_source(const QString& source) {
+  if (steps_.making()) return;
+  if (steps_.busy()) {
+    wanted_source_ = source;
+    return steps_.cancel();
+  }
+  threshold_timer_.stop();
+  wants_islands_ = false;
+  scene_.scan = {};
+  scene_.islands = {};
+  islands_.clear();
+  series_.clear();
+  series_list_->clear();
+  history_ = {};
+  found_hu_ = 0.0;
+  stack_->setCurrentIndex(kNothingOpen);
+  show_work(tr("Searching %1").arg(source));
+  steps_.open(source);
+}
+
+void ImagingPage::show_work(const QString& what) {
+  words_->setText(what);
+  progress_->setRange(0, 0);
+  progress_->show();
+  cancel_->show();
+  enable_parts();
+}
+
+void ImagingPage::end_work(const QString& sentence) {
+  words_->setText(sentence);
+  progress_->hide();
+  cancel_->hide();
+  enable_parts();
+}
+
+void ImagingPage::show_series(const std::vector<ListedSeries>& series) {
+  series_ = series;
+  for (const ListedSeries& of : series_) {
+    auto* item = new QListWidgetItem(QIcon(of.picture), of.text, series_list_);
+    if (!of.problem.isEmpty()) item->setFlags(item->flags() & ~Qt::ItemIsEnabled);
+    if (of.largest) series_list_->setCurrentItem(item);
+  }
+  stack_->setCurrentIndex(kSeriesPage);
+  series_list_->setFocus();
+  end_work(tr("Choose a series."));
+}
+
+void ImagingPage::read_row(const QListWidgetItem* item) {
+  const auto row = static_cast<std::size_t>(series_list_->row(item));
+  if (steps_.busy() || !series_list_->isVisible() || row >= series_.size()) return;
+  show_work(tr("Reading the series"));
+  steps_.read(series_[row].number);
+}
+
+void ImagingPage::show_scan(ShownScan scan) {
+  scene_.scan = std::move(scan);
+  const auto& dims = scene_.scan.geometry.dims;
+  scene_.crosshair = {dims[0] / 2, dims[1] / 2, dims[2] / 2};
+  stack_->setCurrentIndex(kWorkPage);
+  change_window(kBoneWindow);
+  for (ImagingPlane* plane : planes_) plane->begin();
+  planes_[0]->setFocus();
+  find_islands();
+}
+
+void ImagingPage::find_islands() {
+  if (!scene_.open() || steps_.making()) return;
+  if (steps_.busy()) {
+    wants_islands_ = true;
+    return steps_.cancel();
+  }
+  show_work(tr("Finding the parts of bone"));
+  steps_.find(scene_.scan.geometry, history_.now().threshold_hu);
+}
+
+void ImagingPage::show_islands(std::vector<ListedIsland> list, IslandMap map) {
+  islands_ = std::move(list);
+  scene_.islands = std::move(map);
+  found_hu_ = history_.now().threshold_hu;
+  if (!threshold_timer_.isActive()) scene_.look.threshold_hu.reset();
+  end_work(tr("Double-click a bone, or tick it in the list, and make it."));
+  follow_edits();
+}
+
+void ImagingPage::look_at(const std::array<int, 3>& voxel) {
+  scene_.crosshair = voxel;
+  refresh_planes();
+  point_at(voxel);
+}
+
+void ImagingPage::point_at(const std::array<int, 3>& voxel) {
+  const Vec3 at = centre_of(scene_.scan.geometry, voxel);
+  const QLocale locale;
+  QString text =
+      tr("%1 HU at %2, %3, %4 mm")
+          .arg(scene_.scan.at(voxel))
+          .arg(locale.toString(at.x(), 'f', 1), locale.toString(at.y(), 'f', 1), locale.toString(at.z(), 'f', 1));
+  const std::size_t island = scene_.islands.number(voxel);
+  if (island > 0 && island <= islands_.size()) text += '\n' + island_text(islands_[island - 1]);
+  readout_->setText(text);
+}
+
+void ImagingPage::change_window(const GreyWindow& window) {
+  scene_.look.window = window;
+  scene_.greys = GreyTable(window);
+  const auto preset = std::ranges::find(kPresets, window);
+  preset_->setCurrentIndex(preset == kPresets.end() ? -1 : static_cast<int>(preset - kPresets.begin()));
+  refresh_planes();
+}
+
+void ImagingPage::preview_threshold(int hu) {
+  scene_.look.threshold_hu = hu;
+  threshold_timer_.start();
+  refresh_planes();
+}
+
+void ImagingPage::apply_threshold() {
+  ImagingEdits edits = history_.now();
+  edits.threshold_hu = threshold_->value();
+  history_.apply(std::move(edits));
+  follow_edits();
+}
+
+bool ImagingPage::kept(int island) const {
+  return std::ranges::any_of(history_.now().seeds_mm, [&](const Vec3& seed) {
+    const auto voxel = voxel_of(scene_.scan.geometry, seed);
+    return voxel && scene_.islands.number(*voxel) == island;
+  });
+}
+
+void ImagingPage::keep_at(const std::array<int, 3>& voxel) {
+  if (steps_.busy()) return;
+  const int island = scene_.islands.number(voxel);
+  const auto seed = island == 0 ? std::optional<std::array<int, 3>>()
+                                : scene_.islands.seed_near(scene_.scan, island, found_hu_, voxel);
+  if (!seed) return words_->setText(tr("There is no bone at the crosshair. Move it into a tinted part."));
+  ImagingEdits edits = history_.now();
+  const Vec3 at_mm = centre_of(scene_.scan.geometry, *seed);
+  if (std::ranges::find(edits.seeds_mm, at_mm) != edits.seeds_mm.end()) return;
+  edits.seeds_mm.push_back(at_mm);
+  history_.apply(std::move(edits));
+  words_->setText(tr("Part %1 is kept.").arg(island));
+  follow_edits();
+}
+
+void ImagingPage::change_island(const QListWidgetItem* item) {
+  const auto row = static_cast<std::size_t>(island_list_->row(item));
+  if (filling_ || row >= islands_.size()) return;
+  const ListedIsland& island = islands_[row];
+  const bool keep = item->checkState() == Qt::Checked;
+  if (keep == kept(island.number)) return;
+  ImagingEdits edits = history_.now();
+  if (keep) {
+    const auto centre = voxel_of(scene_.scan.geometry, island.centre_mm);
+    const auto seed =
+        scene_.islands.seed_near(scene_.scan, island.number, found_hu_, centre.value_or(scene_.crosshair));
+    if (seed) edits.seeds_mm.push_back(centre_of(scene_.scan.geometry, *seed));
+  } else {
+    std::erase_if(edits.seeds_mm, [&](const Vec3& seed) {
+      const auto voxel = voxel_of(scene_.scan.geometry, seed);
+      return voxel && scene_.islands.number(*voxel) == island.number;
+    });
+  }
+  history_.apply(std::move(edits));
+  follow_edits();
+}
+
+void ImagingPage::follow_edits() {
+  const QSignalBlocker quiet(threshold_);
+  threshold_->setValue(static_cast<int>(history_.now().threshold_hu));
+  threshold_timer_.stop();
+  if (history_.now().threshold_hu != found_hu_) {
+    scene_.look.threshold_hu = history_.now().threshold_hu;
+    find_islands();
+  } else {
+    scene_.look.threshold_hu.reset();
+    refresh_list();
+  }
+  refresh_planes();
+  enable_parts();
+}
+
+void ImagingPage::refresh_list() {
+  filling_ = true;
+  if (island_list_->count() != static_cast<int>(islands_.size())) island_list_->clear();
+  for (std::size_t i = 0; i < islands_.size(); ++i) {
+    const bool keep = kept(islands_[i].number);
+    const Tint tint = tint_of(islands_[i].number, keep);
+    scene_.look.islands[static_cast<std::size_t>(islands_[i].number)] = tint;
+    auto* item = island_list_->item(static_cast<int>(i));
+    if (item == nullptr) item = new QListWidgetItem(island_list_);
+    item->setText(island_text(islands_[i]));
+    item->setIcon(colour_icon(tint));
+    item->setCheckState(keep ? Qt::Checked : Qt::Unchecked);
+  }
+  filling_ = false;
+}
+
+void ImagingPage::refresh_planes() {
+  for (ImagingPlane* plane : planes_)
+    if (plane != nullptr) plane->refresh();
+}
+
+void ImagingPage::enable_parts() {
+  const bool free = !steps_.busy(), making = steps_.making();
+  const bool found = free && scene_.open() && !islands_.empty() && history_.now().threshold_hu == found_hu_;
+  const QString wait = tr("osteon-import is at work. Wait for it, or cancel it.");
+  const QString none = free ? tr("Choose a threshold that bone reaches.") : wait;
+  set_enabled(*back_, !making, wait);
+  set_enabled(*threshold_, !making, wait);
+  set_enabled(*keep_, found, none);
+  set_enabled(*island_list_, found, none);
+  set_enabled(*undo_, !making && history_.can_undo(), making ? wait : tr("There is nothing to undo."));
+  set_enabled(*redo_, !making && history_.can_redo(), making ? wait : tr("There is nothing to redo."));
+  const bool some = !history_.now().seeds_mm.empty();
+  set_enabled(*make_, found && some, found ? tr("Keep a bone first: double-click it, or tick it in the list.") : none);
+}
+
+void ImagingPage::make_bone() {
+  show_work(tr("The bone is being made"));
+  steps_.make(history_.now());
+  events_.busy(steps_.making());
+  enable_parts();
+}
+
+}  // namespace osteon

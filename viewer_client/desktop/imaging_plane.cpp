@@ -1,0 +1,179 @@
+#include "viewer_client/desktop/imaging_plane.hpp"
+
+#include <QImage>
+#include <QKeyEvent>
+#include <QMouseEvent>
+#include <QPainter>
+#include <QSlider>
+#include <QVBoxLayout>
+#include <QWheelEvent>
+#include <algorithm>
+#include <utility>
+
+namespace osteon {
+
+namespace {
+
+constexpr int kMargin_px = 4, kPage = 10;
+constexpr int kWheelStep = 120;  // of Qt, for one notch
+constexpr QColor kCrosshair{90, 230, 140, 170}, kLetter{250, 220, 120};
+
+const char* name_of(Plane plane) {
+  return plane == Plane::axial ? "axial" : plane == Plane::coronal ? "coronal" : "sagittal";
+}
+
+QString title_of(Plane plane) {
+  switch (plane) {
+    case Plane::coronal:
+      return QCoreApplication::translate("ImagingPlane", "Coronal plane");
+    case Plane::sagittal:
+      return QCoreApplication::translate("ImagingPlane", "Sagittal plane");
+    default:
+      return QCoreApplication::translate("ImagingPlane", "Axial plane");
+  }
+}
+
+}  // namespace
+
+ImagingPlane::ImagingPlane(Plane plane, const ImagingScene& scene, Events events, QWidget* parent)
+    : QWidget(parent), plane_(plane), scene_(scene), events_(std::move(events)) {
+  setObjectName(QString("plane_") + name_of(plane));
+  setAccessibleName(title_of(plane));
+  setFocusPolicy(Qt::StrongFocus);
+  setMouseTracking(true);
+  setToolTip(tr("Left: crosshair. Double click, Enter: keep. Right drag: window. Wheel: slices."));
+  slider_ = new QSlider(Qt::Vertical);
+  slider_->setObjectName(QString("slice_") + name_of(plane));
+  slider_->setAccessibleName(tr("%1: slice").arg(title_of(plane)));
+  auto* row = new QHBoxLayout(this);
+  row->setContentsMargins(0, 0, 0, 0);
+  row->addStretch();
+  row->addWidget(slider_);
+  connect(slider_, &QSlider::valueChanged, this, [this](int slice) { go_to_slice(slice); });
+}
+
+void ImagingPlane::begin() {
+  axes_ = axes_of(scene_.scan.geometry, plane_);
+  const QSignalBlocker quiet(slider_);
+  slider_->setRange(0, axes_.slices - 1);
+  slider_->setPageStep(kPage);
+  refresh();
+}
+
+void ImagingPlane::refresh() {
+  if (!scene_.open()) return;
+  drawn_slice_ = -1;
+  const QSignalBlocker quiet(slider_);
+  slider_->setValue(slice());
+  update();
+}
+
+int ImagingPlane::slice() const { return place_in(axes_, scene_.crosshair)[2]; }
+
+PlaneFrame ImagingPlane::frame() const { return fit(axes_, width() - slider_->width() - kMargin_px, height()); }
+
+QPoint ImagingPlane::pixel(const std::array<int, 3>& voxel) const {
+  const auto [column, row, slice] = place_in(axes_, voxel);
+  const auto [x, y] = pixel_of(axes_, frame(), column, row);
+  return {static_cast<int>(x), static_cast<int>(y)};
+}
+
+std::array<int, 3> ImagingPlane::voxel_under(const QPoint& at) const {
+  const auto [column, row] = under(axes_, frame(), at.x() + 0.5, at.y() + 0.5);
+  return voxel_at(axes_, column, row, slice());
+}
+
+void ImagingPlane::paintEvent(QPaintEvent* /*event*/) {
+  QPainter painter(this);
+  const PlaneFrame at = frame();
+  const QRectF all(0, 0, width() - slider_->width() - kMargin_px, height());
+  painter.fillRect(all, Qt::black);
+  if (!scene_.open()) return;
+  if (drawn_slice_ != slice()) {
+    pixels_ = draw_plane(scene_.scan, scene_.islands, axes_, slice(), scene_.look, scene_.greys);
+    drawn_slice_ = slice();
+  }
+  const QImage image(reinterpret_cast<const uchar*>(pixels_.data()), axes_.columns, axes_.rows,
+                     axes_.columns * static_cast<int>(sizeof(std::uint32_t)), QImage::Format_RGB32);
+  const QRectF picture(at.left_px, at.top_px, at.width_px, at.height_px);
+  painter.setRenderHint(QPainter::SmoothPixmapTransform);
+  painter.drawImage(picture, image);
+  const auto [column, row, through] = place_in(axes_, scene_.crosshair);
+  const auto [x, y] = pixel_of(axes_, at, column, row);
+  painter.setPen(kCrosshair);
+  painter.drawLine(QPointF(picture.left(), y), QPointF(picture.right(), y));
+  painter.drawLine(QPointF(x, picture.top()), QPointF(x, picture.bottom()));
+  const PlaneLetters letters = letters_of(plane_);
+  painter.setPen(kLetter);
+  const QRectF inside = all.adjusted(kMargin_px, kMargin_px, -kMargin_px, -kMargin_px);
+  painter.drawText(inside, Qt::AlignLeft | Qt::AlignVCenter, QChar(letters.left));
+  painter.drawText(inside, Qt::AlignRight | Qt::AlignVCenter, QChar(letters.right));
+  painter.drawText(inside, Qt::AlignHCenter | Qt::AlignTop, QChar(letters.top));
+  painter.drawText(inside, Qt::AlignHCenter | Qt::AlignBottom, QChar(letters.bottom));
+  painter.drawText(inside, Qt::AlignLeft | Qt::AlignTop,
+                   tr("%1, %2 of %3").arg(title_of(plane_)).arg(through + 1).arg(axes_.slices));
+  if (hasFocus()) {
+    painter.setPen(kLetter);
+    painter.drawRect(all.adjusted(0, 0, -1, -1));
+  }
+}
+
+void ImagingPlane::mousePressEvent(QMouseEvent* event) {
+  dragged_from_ = event->pos();
+  if (scene_.open() && event->button() == Qt::LeftButton) events_.look_at(voxel_under(event->pos()));
+}
+
+void ImagingPlane::mouseMoveEvent(QMouseEvent* event) {
+  if (!scene_.open()) return;
+  if ((event->buttons() & Qt::LeftButton) != 0) return events_.look_at(voxel_under(event->pos()));
+  if ((event->buttons() & Qt::RightButton) != 0) {
+    const QPoint way = event->pos() - dragged_from_;
+    dragged_from_ = event->pos();
+    return events_.change_window(dragged(scene_.look.window, way.x(), way.y()));
+  }
+  events_.point_at(voxel_under(event->pos()));
+}
+
+void ImagingPlane::mouseDoubleClickEvent(QMouseEvent* event) {
+  if (scene_.open() && event->button() == Qt::LeftButton) events_.keep(voxel_under(event->pos()));
+}
+
+void ImagingPlane::wheelEvent(QWheelEvent* event) {
+  const int notches = event->angleDelta().y() / kWheelStep;
+  if (scene_.open() && notches != 0) move_by(0, 0, notches);
+  event->accept();
+}
+
+void ImagingPlane::keyPressEvent(QKeyEvent* event) {
+  if (!scene_.open()) return QWidget::keyPressEvent(event);
+  switch (event->key()) {
+    case Qt::Key_Left:
+      return move_by(-1, 0, 0);
+    case Qt::Key_Right:
+      return move_by(1, 0, 0);
+    case Qt::Key_Up:
+      return move_by(0, -1, 0);
+    case Qt::Key_Down:
+      return move_by(0, 1, 0);
+    case Qt::Key_PageUp:
+      return move_by(0, 0, 1);
+    case Qt::Key_PageDown:
+      return move_by(0, 0, -1);
+    case Qt::Key_Return:
+    case Qt::Key_Enter:
+      return events_.keep(scene_.crosshair);
+    default:
+      return QWidget::keyPressEvent(event);
+  }
+}
+
+void ImagingPlane::move_by(int right, int down, int through) {
+  const auto [column, row, slice] = place_in(axes_, scene_.crosshair);
+  events_.look_at(voxel_at(axes_, std::clamp(column + right, 0, axes_.columns - 1),
+                           std::clamp(row + down, 0, axes_.rows - 1),
+                           std::clamp(slice + through, 0, axes_.slices - 1)));
+}
+
+void ImagingPlane::go_to_slice(int slice) { move_by(0, 0, slice - this->slice()); }
+
+}  // namespace osteon

@@ -1,0 +1,74 @@
+// One plane of a scan as a picture: crosshair, letters of the patient's sides, and a slider through its slices.
+#pragma once
+#include <QCoreApplication>
+#include <QWidget>
+#include <array>
+#include <functional>
+#include <vector>
+
+#include "viewer_client/imaging/plane_picture.hpp"
+
+class QSlider;
+
+namespace osteon {
+
+// What the three planes show together.
+struct ImagingScene {
+  ShownScan scan;  // without voxels: none is open
+  IslandMap islands;
+  PlaneLook look;
+  GreyTable greys{GreyWindow{}};
+  std::array<int, 3> crosshair{};  // its voxel
+
+  [[nodiscard]] bool open() const { return !scan.values.empty(); }
+};
+
+// [GUI thread] The left button moves the crosshair, a double click keeps the bone there, the right button drags the
+// window, and the wheel goes through the slices. Arrow keys, page keys and Enter do the same.
+class ImagingPlane : public QWidget {
+  Q_DECLARE_TR_FUNCTIONS(ImagingPlane)
+
+ public:
+  struct Events {
+    std::function<void(const std::array<int, 3>&voxel)> look_at, point_at, keep;
+    std::function<void(const GreyWindow& window)> change_window;
+  };
+  // `scene` outlives the plane.
+  ImagingPlane(Plane plane, const ImagingScene& scene, Events events, QWidget* parent = nullptr);
+
+  // Another scan, with other axes.
+  void begin();
+  // The scene has changed.
+  void refresh();
+  // Middle of a voxel, in pixels of the widget.
+  [[nodiscard]] QPoint pixel(const std::array<int, 3>& voxel) const;
+  [[nodiscard]] int slice() const;
+  [[nodiscard]] QSize sizeHint() const override { return {360, 300}; }
+  [[nodiscard]] QSize minimumSizeHint() const override { return {160, 140}; }
+
+ protected:
+  void paintEvent(QPaintEvent* event) override;
+  void mousePressEvent(QMouseEvent* event) override;
+  void mouseMoveEvent(QMouseEvent* event) override;
+  void mouseDoubleClickEvent(QMouseEvent* event) override;
+  void wheelEvent(QWheelEvent* event) override;
+  void keyPressEvent(QKeyEvent* event) override;
+
+ private:
+  [[nodiscard]] PlaneFrame frame() const;
+  [[nodiscard]] std::array<int, 3> voxel_under(const QPoint& at) const;
+  // The crosshair, moved by so many voxels within the plane and through it.
+  void move_by(int right, int down, int through);
+  void go_to_slice(int slice);
+
+  Plane plane_;
+  const ImagingScene& scene_;
+  Events events_;
+  PlaneAxes axes_;
+  QSlider* slider_;
+  std::vector<std::uint32_t> pixels_;
+  int drawn_slice_ = -1;  // -1: the picture is stale
+  QPoint dragged_from_;
+};
+
+}  // namespace osteon

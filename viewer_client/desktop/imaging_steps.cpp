@@ -1,0 +1,205 @@
+#include "viewer_client/desktop/imaging_steps.hpp"
+
+#include <QFile>
+#include <QFileInfo>
+#include <QJsonArray>
+#include <QJsonDocument>
+#include <QJsonObject>
+#include <QLocale>
+#include <QSaveFile>
+#include <system_error>
+#include <utility>
+
+namespace osteon {
+
+namespace {
+
+constexpr const char* kScanFile = "scan.nrrd";
+constexpr const char* kIslandFile = "islands.nrrd";
+constexpr const char* kPictures = "pictures";
+// Files with one scan by the ends of their names. What is inside decides in osteon-import.
+constexpr const char* kOneScan[] = {".nii", ".nii.gz", ".nrrd", ".nhdr", ".mha", ".mhd", ".inv3"};
+
+bool has_one_scan(const QString& source) {
+  if (!QFileInfo(source).isFile()) return false;
+  for (const char* end : kOneScan)
+    if (source.endsWith(end, Qt::CaseInsensitive)) return true;
+  return false;
+}
+
+QString number_text(double value) { return QLocale().toString(value, 'g', 3); }
+
+ListedSeries listed_series(const QJsonObject& of, int taken, const QString& pictures) {
+  ListedSeries series;
+  series.number = of["number"].toInt();
+  series.largest = series.number == taken;
+  series.problem = of["problem"].toString();
+  series.picture = pictures + QString("/series-%1.png").arg(series.number);
+  const QJsonArray spacing = of["spacing_mm"].toArray();
+  QString what = QCoreApplication::translate("ImagingSteps", "CT, %1 slices, %2 × %3 pixels")
+                     .arg(of["slices"].toInt())
+                     .arg(of["columns"].toInt())
+                     .arg(of["rows"].toInt());
+  if (spacing.size() == 3 && spacing[2].toDouble() > 0.0)
+    what += QCoreApplication::translate("ImagingSteps", ", pitch %1 × %2 × %3 mm")
+                .arg(number_text(spacing[0].toDouble()), number_text(spacing[1].toDouble()),
+                     number_text(spacing[2].toDouble()));
+  const QString description = of["description"].toString();
+  series.text = (description.isEmpty() ? QCoreApplication::translate("ImagingSteps", "Series %1").arg(series.number)
+                                       : description) +
+                '\n' + what;
+  if (!series.problem.isEmpty()) series.text += '\n' + series.problem;
+  return series;
+}
+
+std::vector<ListedIsland> listed_islands(const QString& said) {
+  std::vector<ListedIsland> islands;
+  for (const QJsonValue& value : QJsonDocument::fromJson(said.toUtf8()).object()["islands"].toArray()) {
+    const QJsonObject of = value.toObject();
+    const QJsonArray at = of["centre_mm"].toArray();
+    islands.push_back({of["number"].toInt(), of["kind"].toString().toStdString(), of["volume_cm3"].toDouble(),
+                       of["density_g_cm3"].toDouble(), Vec3(at[0].toDouble(), at[1].toDouble(), at[2].toDouble())});
+  }
+  return islands;
+}
+
+}  // namespace
+
+// StaleFiles knows a folder of this name as that of a program that was killed.
+ImagingSteps::ImagingSteps(Events events)
+    : events_(std::move(events)),
+      scratch_(cases_folder() / (".partial-imaging-" + std::to_string(QCoreApplication::applicationPid()))) {}
+
+ImagingSteps::~ImagingSteps() {
+  if (loader_) loader_->wait();
+  run_.reset();
+  maker_.reset();
+  std::error_code ignored;
+  std::filesystem::remove_all(scratch_, ignored);
+}
+
+QString ImagingSteps::scratch_file(const char* name) const { return text_of(scratch_ / name); }
+
+// Only the user may read it: it has a patient's scan.
+bool ImagingSteps::make_scratch() {
+  std::error_code error;
+  std::filesystem::remove_all(scratch_, error);
+  std::filesystem::create_directories(scratch_, error);
+  if (!error) std::filesystem::permissions(scratch_, std::filesystem::perms::owner_all, error);
+  return !error;
+}
+
+void ImagingSteps::cancel() {
+  cancelled_ = true;
+  if (run_) run_->cancel();
+  if (maker_) maker_->cancel();
+}
+
+void ImagingSteps::fail(const QString& sentence) { events_.failed(cancelled_ ? QString() : sentence); }
+
+void ImagingSteps::start(const QStringList& arguments, std::function<void(const QString& said)> done) {
+  cancelled_ = false;
+  run_ = std::make_unique<ImporterRun>(arguments, scratch_file("log"),
+                                       ImporterRun::Events{[this](int percent) { events_.progress(percent); },
+                                                           [this, done = std::move(done)](const QString& said) {
+                                                             run_.release()->deleteLater();
+                                                             if (cancelled_) return fail({});
+                                                             done(said);
+                                                           },
+                                                           [this](const QString& sentence) {
+                                                             run_.release()->deleteLater();
+                                                             fail(sentence);
+                                                           }});
+  run_->start();
+}
+
+void ImagingSteps::in_background(std::function<void()> work, std::function<void()> then) {
+  loader_.reset(QThread::create(std::move(work)));
+  connect(loader_.get(), &QThread::finished, this, [this, then = std::move(then)] {
+    loader_.release()->deleteLater();
+    if (cancelled_) return fail({});
+    then();
+  });
+  loader_->start();
+}
+
+void ImagingSteps::open(const QString& source) {
+  cancelled_ = false;
+  source_ = source;
+  if (!make_scratch())
+    return fail(tr("Cannot make the folder %1. Choose a place where you may write.").arg(text_of(scratch_)));
+  if (has_one_scan(source)) return read({});
+  start({"series", source, "--json", "--pictures", scratch_file(kPictures)},
+        [this](const QString& said) { read_series(said); });
+}
+
+void ImagingSteps::read_series(const QString& said) {
+  const QJsonObject report = QJsonDocument::fromJson(said.toUtf8()).object();
+  std::vector<ListedSeries> series;
+  for (const QJsonValue& value : report["series"].toArray())
+    series.push_back(listed_series(value.toObject(), report["taken"].toInt(), scratch_file(kPictures)));
+  if (series.empty()) return fail(tr("%1 has no CT series. Open another folder or file.").arg(source_));
+  events_.listed(series);
+}
+
+void ImagingSteps::read(std::optional<int> series) {
+  series_ = series;
+  QFile::remove(scratch_file(kScanFile));
+  QStringList arguments{"export-scan", source_, scratch_file(kScanFile)};
+  if (series) arguments << "--series" << QString::number(*series);
+  start(arguments, [this](const QString&) {
+    in_background([this] { scan_ = read_scan_file(scratch_ / kScanFile); },
+                  [this] {
+                    Result<ShownScan> scan = *std::exchange(scan_, std::nullopt);
+                    if (!scan) return fail(QString::fromStdString(scan.error().message));
+                    events_.read(std::move(*scan));
+                  });
+  });
+}
+
+void ImagingSteps::find(const ScanGeometry& scan, double threshold_hu) {
+  QFile::remove(scratch_file(kIslandFile));
+  start({"islands", scratch_file(kScanFile), scratch_file(kIslandFile), "--threshold",
+         QString::number(threshold_hu, 'g', 17)},
+        [this, scan](const QString& said) { read_islands(said, scan); });
+}
+
+void ImagingSteps::read_islands(const QString& said, const ScanGeometry& scan) {
+  in_background(
+      [this, scan] {
+        auto numbers = read_number_file(scratch_ / kIslandFile);
+        islands_ =
+            numbers ? IslandMap::make(scan, std::move(*numbers)) : Result<IslandMap>(tl::unexpected(numbers.error()));
+      },
+      [this, said] {
+        Result<IslandMap> map = *std::exchange(islands_, std::nullopt);
+        if (!map) return fail(QString::fromStdString(map.error().message));
+        events_.found(listed_islands(said), std::move(*map));
+      });
+}
+
+void ImagingSteps::make(const ImagingEdits& edits) {
+  cancelled_ = false;
+  const std::filesystem::path out = new_case_folder(source_);
+  const QString file = text_of(out) + ".edits.yaml";
+  const QByteArray text = QByteArray::fromStdString(edit_list_text(edits));
+  QSaveFile saved(file);
+  if (!saved.open(QIODevice::WriteOnly) || saved.write(text) != text.size() || !saved.commit())
+    return fail(tr("Cannot write %1. Is the disk full?").arg(file));
+  QStringList how{"ct", source_, "--threshold", QString::number(edits.threshold_hu, 'g', 17), "--edits", file};
+  if (series_) how << "--series" << QString::number(*series_);
+  maker_ = std::make_unique<CaseMaker>(how, out,
+                                       CaseMaker::Events{[this](int percent) { events_.progress(percent); },
+                                                         [this](const std::filesystem::path& bone) {
+                                                           maker_.release()->deleteLater();
+                                                           events_.made(bone);
+                                                         },
+                                                         [this, file](const QString& sentence) {
+                                                           maker_.release()->deleteLater();
+                                                           QFile::remove(file);  // the page has the edits
+                                                           fail(sentence);
+                                                         }});
+  maker_->start();
+}
+
+}  // namespace osteon

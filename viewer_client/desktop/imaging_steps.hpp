@@ -1,0 +1,82 @@
+// The steps from a CT to a case: list its series, read one, find its islands, make the case. osteon-import does each in
+// a process of its own, so that the window never waits, and a damaged file ends only that process.
+#pragma once
+#include <QCoreApplication>
+#include <QObject>
+#include <QString>
+#include <QStringList>
+#include <QThread>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "viewer_client/desktop/importer_run.hpp"
+#include "viewer_client/desktop/library.hpp"
+#include "viewer_client/imaging/edit_history.hpp"
+#include "viewer_client/imaging/island_map.hpp"
+
+namespace osteon {
+
+// What a person chooses from.
+struct ListedSeries {
+  int number = 0;
+  QString text;     // description, modality, slices, size and pitch
+  QString problem;  // why it cannot be read; empty: it can
+  QString picture;  // file; it may not be there
+  bool largest = false;
+};
+
+// [GUI thread] One step at a time. Its scratch files go when it goes.
+class ImagingSteps : public QObject {
+  Q_DECLARE_TR_FUNCTIONS(ImagingSteps)
+
+ public:
+  struct Events {
+    std::function<void(int percent)> progress;
+    std::function<void(const std::vector<ListedSeries>& series)> listed;
+    std::function<void(ShownScan scan)> read;
+    std::function<void(std::vector<ListedIsland> list, IslandMap map)> found;
+    std::function<void(const std::filesystem::path& bone)> made;
+    std::function<void(const QString& sentence)> failed;  // empty: cancelled
+  };
+  explicit ImagingSteps(Events events);
+  ~ImagingSteps() override;
+
+  [[nodiscard]] bool busy() const { return run_ || maker_ || loader_; }
+  [[nodiscard]] bool making() const { return maker_ != nullptr; }
+  void cancel();
+
+  // A folder, zip, ISO image or slice has series. Any other file has one scan, which is read at once.
+  void open(const QString& source);
+  // A series that was listed.
+  void read(std::optional<int> series);
+  // Of the scan that was read.
+  void find(const ScanGeometry& scan, double threshold_hu);
+  // The case has the edit list beside it, in a file NAME.edits.yaml.
+  void make(const ImagingEdits& edits);
+
+ private:
+  void start(const QStringList& arguments, std::function<void(const QString& said)> done);
+  void in_background(std::function<void()> work, std::function<void()> then);
+  void fail(const QString& sentence);
+  [[nodiscard]] bool make_scratch();
+  [[nodiscard]] QString scratch_file(const char* name) const;
+  void read_series(const QString& said);
+  void read_islands(const QString& said, const ScanGeometry& scan);
+
+  Events events_;
+  std::filesystem::path scratch_;
+  QString source_;
+  std::optional<int> series_;
+  bool cancelled_ = false;
+  std::unique_ptr<ImporterRun> run_;
+  std::unique_ptr<CaseMaker> maker_;
+  // The other thread writes these, and the GUI thread reads them when it has ended.
+  std::optional<Result<ShownScan>> scan_;
+  std::optional<Result<IslandMap>> islands_;
+  std::unique_ptr<QThread> loader_;
+};
+
+}  // namespace osteon

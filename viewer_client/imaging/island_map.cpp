@@ -1,0 +1,71 @@
+#include "viewer_client/imaging/island_map.hpp"
+
+#include <cmath>
+#include <limits>
+#include <utility>
+
+namespace osteon {
+
+namespace {
+
+constexpr double kSameVoxel = 1e-3;  // of a step
+
+Vec3 voxels_at(const ScanGeometry& scan, const Vec3& at_mm) {
+  return scan.axes_mm.inverse() * (at_mm - scan.origin_mm);
+}
+
+}  // namespace
+
+std::optional<std::array<int, 3>> voxel_of(const ScanGeometry& scan, const Vec3& at_mm) {
+  const Vec3 at = voxels_at(scan, at_mm);
+  std::array<int, 3> voxel{};
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto a = static_cast<std::size_t>(axis);
+    if (!(at[axis] >= -0.5) || !(at[axis] < scan.dims[a] - 0.5)) return {};
+    voxel[a] = static_cast<int>(std::floor(at[axis] + 0.5));
+  }
+  return voxel;
+}
+
+Vec3 centre_of(const ScanGeometry& scan, const std::array<int, 3>& voxel) {
+  return scan.position_mm(Vec3(voxel[0], voxel[1], voxel[2]));
+}
+
+Result<IslandMap> IslandMap::make(const ScanGeometry& scan, VoxelFile<std::uint8_t> numbers) {
+  IslandMap map;
+  const Vec3 at = voxels_at(scan, numbers.geometry.origin_mm);
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto a = static_cast<std::size_t>(axis);
+    map.first_[a] = static_cast<int>(std::lround(at[axis]));
+    if (std::abs(at[axis] - map.first_[a]) > kSameVoxel || map.first_[a] < 0 ||
+        map.first_[a] + numbers.geometry.dims[a] > scan.dims[a] ||
+        (scan.axes_mm.col(axis) - numbers.geometry.axes_mm.col(axis)).norm() >
+            kSameVoxel * scan.axes_mm.col(axis).norm())
+      return bad_input("the islands lie on other voxels than the scan; open the CT again");
+  }
+  map.numbers_ = std::move(numbers);
+  return map;
+}
+
+std::optional<std::array<int, 3>> IslandMap::seed_near(const ShownScan& scan, int island, double threshold_hu,
+                                                       const std::array<int, 3>& voxel) const {
+  std::optional<std::array<int, 3>> nearest;
+  double least_mm2 = std::numeric_limits<double>::infinity();
+  const Vec3 step_mm = scan.geometry.axes_mm.colwise().norm();
+  const auto [columns, rows, slices] = numbers_.geometry.dims;
+  std::size_t n = 0;
+  for (int k = 0; k < slices; ++k)
+    for (int j = 0; j < rows; ++j)
+      for (int i = 0; i < columns; ++i, ++n) {
+        if (numbers_.values[n] != island) continue;
+        const std::array<int, 3> at{i + first_[0], j + first_[1], k + first_[2]};
+        const Vec3 way(at[0] - voxel[0], at[1] - voxel[1], at[2] - voxel[2]);
+        const double mm2 = way.cwiseProduct(step_mm).squaredNorm();
+        if (mm2 >= least_mm2 || scan.at(at) < threshold_hu) continue;
+        least_mm2 = mm2;
+        nearest = at;
+      }
+  return nearest;
+}
+
+}  // namespace osteon

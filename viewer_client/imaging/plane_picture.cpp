@@ -1,0 +1,52 @@
+#include "viewer_client/imaging/plane_picture.hpp"
+
+namespace osteon {
+
+namespace {
+
+constexpr std::array<Tint, 8> kIslandColours{{{70, 160, 255, 0},
+                                              {255, 120, 60, 0},
+                                              {90, 210, 90, 0},
+                                              {220, 90, 220, 0},
+                                              {60, 210, 210, 0},
+                                              {240, 210, 60, 0},
+                                              {160, 120, 255, 0},
+                                              {255, 120, 160, 0}}};
+constexpr std::uint8_t kKept = 130, kLeftOut = 35;
+
+std::uint32_t mixed_channel(std::uint8_t grey, std::uint8_t colour, std::uint8_t strength) {
+  constexpr std::uint32_t kAll = 255;
+  return (grey * (kAll - strength) + std::uint32_t{colour} * strength + kAll / 2) / kAll;
+}
+
+std::uint32_t tinted(std::uint8_t grey, const Tint& tint) {
+  return 0xff000000u | mixed_channel(grey, tint.red, tint.strength) << 16 |
+         mixed_channel(grey, tint.green, tint.strength) << 8 | mixed_channel(grey, tint.blue, tint.strength);
+}
+
+}  // namespace
+
+Tint tint_of(int island, bool kept) {
+  Tint tint = kIslandColours[static_cast<std::size_t>(island - 1) % kIslandColours.size()];
+  tint.strength = kept ? kKept : kLeftOut;
+  return tint;
+}
+
+std::vector<std::uint32_t> draw_plane(const ShownScan& scan, const IslandMap& islands, const PlaneAxes& axes, int slice,
+                                      const PlaneLook& look, const GreyTable& greys) {
+  std::vector<std::uint32_t> pixels;
+  pixels.reserve(static_cast<std::size_t>(axes.columns) * static_cast<std::size_t>(axes.rows));
+  for (int row = 0; row < axes.rows; ++row)
+    for (int column = 0; column < axes.columns; ++column) {
+      const std::array<int, 3> voxel = voxel_at(axes, column, row, slice);
+      const std::int16_t hu = scan.at(voxel);
+      const std::uint8_t island = islands.number(voxel);
+      const bool above = look.threshold_hu && hu >= *look.threshold_hu;
+      pixels.push_back(tinted(greys[hu], island != 0 && !look.threshold_hu ? look.islands[island]
+                                         : above                           ? kThresholdTint
+                                                                           : Tint{}));
+    }
+  return pixels;
+}
+
+}  // namespace osteon

@@ -1,0 +1,34 @@
+// The picture of a plane of a scan: grey values, with islands and everything above a threshold tinted.
+#pragma once
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "viewer_client/imaging/grey_window.hpp"
+#include "viewer_client/imaging/island_map.hpp"
+#include "viewer_client/imaging/plane_view.hpp"
+
+namespace osteon {
+
+struct Tint {
+  std::uint8_t red = 0, green = 0, blue = 0, strength = 0;  // 0: none; 255: the colour alone
+  friend bool operator==(const Tint&, const Tint&) = default;
+};
+// A colour for an island. Neighbours in the list differ. One that is left out is pale.
+[[nodiscard]] Tint tint_of(int island, bool kept);
+inline constexpr Tint kThresholdTint{255, 200, 40, 110};
+
+struct PlaneLook {
+  GreyWindow window;
+  std::optional<double> threshold_hu;  // voxels at or above it are tinted
+  std::array<Tint, 256> islands{};     // by number; that of 0 is not used
+};
+
+// One pixel for each voxel, 0xffRRGGBB, rows from the top. With a threshold the islands, which are of another one, are
+// not tinted.
+[[nodiscard]] std::vector<std::uint32_t> draw_plane(const ShownScan& scan, const IslandMap& islands,
+                                                    const PlaneAxes& axes, int slice, const PlaneLook& look,
+                                                    const GreyTable& greys);
+
+}  // namespace osteon
