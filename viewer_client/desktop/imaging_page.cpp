@@ -145,7 +145,7 @@ QWidget* ImagingPage::make_planes() {
                                   {[this](const std::array<int, 3>& voxel) { look_at(voxel); },
                                    [this](const std::array<int, 3>& voxel) { point_at(voxel); },
                                    [this](const std::array<int, 3>& voxel) { keep_at(voxel); },
-                                   [this](const GreyWindow& window) { change_window(window); }});
+                                   [this](const HuWindow& window) { change_window(window); }});
     grid->addWidget(planes_[i], static_cast<int>(i) / 2, static_cast<int>(i) % 2);
   }
   readout_ = new QLabel;
@@ -316,7 +316,7 @@ void ImagingPage::point_at(const std::array<int, 3>& voxel) {
   readout_->setText(text);
 }
 
-void ImagingPage::change_window(const GreyWindow& window) {
+void ImagingPage::change_window(const HuWindow& window) {
   scene_.look.window = window;
   scene_.greys = GreyTable(window);
   const auto preset = std::ranges::find(kPresets, window);

@@ -64,7 +64,7 @@ class ImagingPage : public QWidget {
 
   void look_at(const std::array<int, 3>& voxel);
   void point_at(const std::array<int, 3>& voxel);
-  void change_window(const GreyWindow& window);
+  void change_window(const HuWindow& window);
   void preview_threshold(int hu);
   void apply_threshold();
   // A seed at the voxel, or near to it in its island.

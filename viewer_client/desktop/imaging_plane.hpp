@@ -17,7 +17,7 @@ struct ImagingScene {
   ShownScan scan;  // without voxels: none is open
   IslandMap islands;
   PlaneLook look;
-  GreyTable greys{GreyWindow{}};
+  GreyTable greys{HuWindow{}};
   std::array<int, 3> crosshair{};  // its voxel
 
   [[nodiscard]] bool open() const { return !scan.values.empty(); }
@@ -31,7 +31,7 @@ class ImagingPlane : public QWidget {
  public:
   struct Events {
     std::function<void(const std::array<int, 3>&voxel)> look_at, point_at, keep;
-    std::function<void(const GreyWindow& window)> change_window;
+    std::function<void(const HuWindow& window)> change_window;
   };
   // `scene` outlives the plane.
   ImagingPlane(Plane plane, const ImagingScene& scene, Events events, QWidget* parent = nullptr);

@@ -10,7 +10,7 @@
 #include <optional>
 #include <vector>
 
-#include "viewer_client/inside/hu_window.hpp"
+#include "viewer_client/imaging/hu_window.hpp"
 #include "viewer_client/inside/slice_painter.hpp"
 
 namespace osteon {

@@ -5,7 +5,7 @@
 #include <optional>
 #include <vector>
 
-#include "viewer_client/imaging/grey_window.hpp"
+#include "viewer_client/imaging/hu_window.hpp"
 #include "viewer_client/imaging/island_map.hpp"
 #include "viewer_client/imaging/plane_view.hpp"
 
@@ -20,7 +20,7 @@ struct Tint {
 inline constexpr Tint kThresholdTint{255, 200, 40, 110};
 
 struct PlaneLook {
-  GreyWindow window;
+  HuWindow window;
   std::optional<double> threshold_hu;  // voxels at or above it are tinted
   std::array<Tint, 256> islands{};     // by number; that of 0 is not used
 };

@@ -12,7 +12,7 @@ struct TwoVoxels {
   ShownScan scan;
   IslandMap islands;
   PlaneLook look;
-  GreyTable greys{{128.0, 256.0}};
+  GreyTable greys{{127.5, 255.0}};
 
   TwoVoxels() {
     scan.geometry.dims = {2, 1, 1};

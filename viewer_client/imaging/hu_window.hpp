@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdint>
 #include <span>
+#include <vector>
 
 namespace osteon {
 
@@ -29,6 +30,16 @@ inline constexpr double kLeastLevel_hu = -1000.0, kMostLevel_hu = 4000.0, kLeast
   return {std::clamp(window.level_hu + hu_per_px * down_px, kLeastLevel_hu, kMostLevel_hu),
           std::clamp(window.width_hu + hu_per_px * right_px, kLeastWidth_hu, kMostWidth_hu)};
 }
+
+// The grey value of each HU that 16 bits hold.
+class GreyTable {
+ public:
+  explicit GreyTable(const HuWindow& window);
+  [[nodiscard]] std::uint8_t operator[](std::int16_t hu) const { return greys_[static_cast<std::size_t>(hu + 32768)]; }
+
+ private:
+  std::vector<std::uint8_t> greys_;
+};
 
 // `grey` has one value for each of `hu`. The window's width is above zero.
 void grey_of(std::span<const float> hu, const HuWindow& window, std::span<std::uint8_t> grey);

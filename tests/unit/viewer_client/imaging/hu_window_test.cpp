@@ -1,5 +1,5 @@
 // Windows of HU, against DICOM's formula.
-#include "viewer_client/inside/hu_window.hpp"
+#include "viewer_client/imaging/hu_window.hpp"
 
 #include <gtest/gtest.h>
 
@@ -20,6 +20,15 @@ TEST(HuWindow, IsLinearBetweenBlackAndWhite) {
   std::array<std::uint8_t, 3> grey{};
   grey_of(hu, window, grey);
   EXPECT_EQ(grey, (std::array<std::uint8_t, 3>{0, 64, 255}));
+}
+
+TEST(HuWindow, ATableHasTheGreyOfEachHu) {
+  const GreyTable greys({127.5, 255.0});  // from 0 to 255
+  for (int hu = 0; hu < 256; ++hu) EXPECT_EQ(greys[static_cast<std::int16_t>(hu)], hu);
+  EXPECT_EQ(greys[-1], 0);
+  EXPECT_EQ(greys[-32768], 0);
+  EXPECT_EQ(greys[256], 255);
+  EXPECT_EQ(greys[32767], 255);
 }
 
 TEST(HuWindow, ADragToTheRightWidensItAndOneDownMakesTheImageDarker) {
