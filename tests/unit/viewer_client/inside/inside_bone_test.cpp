@@ -335,7 +335,7 @@ TEST(InsideOfAScannedCase, HasTheHuOfTheScanInItsFolder) {
   // The scan's box is larger than the bone's. Only samples beyond the faces of its outer voxels are air.
   const std::vector<float> values = copy->is();
   const auto scanned_hu = std::ranges::count_if(values, [](float hu) { return std::abs(hu - 1000.0f) < 1.0f; });
-  EXPECT_GT(static_cast<double>(scanned_hu), 0.9 * static_cast<double>(values.size()));
+  EXPECT_GT(static_cast<double>(scanned_hu), 0.85 * static_cast<double>(values.size()));
 }
 
 TEST(InsideOfAScannedCase, HasThoseOfItsDensityWhenTheScanIsDamaged) {
