@@ -13,8 +13,8 @@ namespace osteon {
 namespace {
 
 constexpr double kNotchOfWheel = 120.0, kZoomOfNotch = 0.85;
-constexpr double kGap_px = 6.0;  // of the cross round its middle, so that the tip is seen
-constexpr int kMargin_px = 4;
+constexpr double kCrossGap_px = 6.0;  // of the cross round its middle, so that the tip is seen
+constexpr int kSliceEdge_px = 4;
 constexpr QRgb kToolColour = 0xfff0e442, kPlannedColour = 0xff56b4e9;
 
 // White letters are read on bone too.
@@ -125,7 +125,7 @@ void SliceView::paintEvent(QPaintEvent*) {
   painter.fillRect(rect(), Qt::black);
   if (!image_) {
     painter.setPen(Qt::white);
-    painter.drawText(rect().adjusted(kMargin_px, kMargin_px, -kMargin_px, -kMargin_px),
+    painter.drawText(rect().adjusted(kSliceEdge_px, kSliceEdge_px, -kSliceEdge_px, -kSliceEdge_px),
                      Qt::AlignCenter | Qt::TextWordWrap, notice_);
   } else {
     const double ratio = devicePixelRatioF();
@@ -146,11 +146,11 @@ void SliceView::paintEvent(QPaintEvent*) {
 void SliceView::paint_lines(QPainter& painter) const {
   const QPointF cross = place_of(overlay_.point_mm);
   painter.setPen(line_colours_[0]);
-  painter.drawLine(QPointF(0, cross.y()), QPointF(cross.x() - kGap_px, cross.y()));
-  painter.drawLine(QPointF(cross.x() + kGap_px, cross.y()), QPointF(width(), cross.y()));
+  painter.drawLine(QPointF(0, cross.y()), QPointF(cross.x() - kCrossGap_px, cross.y()));
+  painter.drawLine(QPointF(cross.x() + kCrossGap_px, cross.y()), QPointF(width(), cross.y()));
   painter.setPen(line_colours_[1]);
-  painter.drawLine(QPointF(cross.x(), 0), QPointF(cross.x(), cross.y() - kGap_px));
-  painter.drawLine(QPointF(cross.x(), cross.y() + kGap_px), QPointF(cross.x(), height()));
+  painter.drawLine(QPointF(cross.x(), 0), QPointF(cross.x(), cross.y() - kCrossGap_px));
+  painter.drawLine(QPointF(cross.x(), cross.y() + kCrossGap_px), QPointF(cross.x(), height()));
   if (!overlay_.tool_axis) return;
   if (const auto axis = project(image_->plane, overlay_.tool_axis->point_mm, overlay_.tool_axis->direction)) {
     painter.setPen(QPen(QColor(kToolColour), 1.0, Qt::DotLine));
@@ -165,10 +165,10 @@ void SliceView::paint_planned(QPainter& painter) const {
     painter.setPen(QPen(QColor(kPlannedColour), 1.5, Qt::DashLine));
     painter.drawLine(to_widget(line->from), to_widget(line->to));
     if (!line->through) continue;
-    constexpr double kRing_px = 4.0;
+    constexpr double kThroughRing_px = 4.0;
     painter.setPen(QPen(QColor(kPlannedColour), 1.5));
     const QPointF through = to_widget(*line->through);
-    painter.drawEllipse(through, kRing_px, kRing_px);
+    painter.drawEllipse(through, kThroughRing_px, kThroughRing_px);
     write(painter, QRect(through.toPoint() + QPoint(6, -18), QSize(width(), 16)), Qt::AlignLeft | Qt::AlignVCenter,
           planned.name, QColor(kPlannedColour));
   }
@@ -176,7 +176,7 @@ void SliceView::paint_planned(QPainter& painter) const {
 
 void SliceView::paint_words(QPainter& painter) const {
   const radiology::PixelGrid& plane = image_->plane;
-  const QRect inner = rect().adjusted(kMargin_px, kMargin_px, -kMargin_px, -kMargin_px);
+  const QRect inner = rect().adjusted(kSliceEdge_px, kSliceEdge_px, -kSliceEdge_px, -kSliceEdge_px);
   write(painter, inner, Qt::AlignTop | Qt::AlignLeft, title_, colour_);
   write(painter, inner, Qt::AlignVCenter | Qt::AlignLeft, letters(-plane.column_mm));
   write(painter, inner, Qt::AlignVCenter | Qt::AlignRight, letters(plane.column_mm));
@@ -188,7 +188,7 @@ void SliceView::paint_words(QPainter& painter) const {
   painter.setPen(QPen(Qt::white, 2));
   painter.drawLine(begin, end);
   const int decimals = bar_mm < 1.0 ? 1 : 0;
-  write(painter, inner.adjusted(0, 0, 0, -kMargin_px), Qt::AlignBottom | Qt::AlignRight,
+  write(painter, inner.adjusted(0, 0, 0, -kSliceEdge_px), Qt::AlignBottom | Qt::AlignRight,
         tr("%1 mm").arg(QLocale().toString(bar_mm, 'f', decimals)));
 }
 

@@ -32,12 +32,12 @@ constexpr std::array<const char*, kSlices> kSliderNames{"slice_slider_0", "slice
 
 constexpr double kToolField_mm = 60.0;                // the shorter side of an image along the tool
 constexpr double kLeastZoom = 0.01, kMostZoom = 5.0;  // mm for each pixel
-constexpr double kMargin = 1.05;                      // of a bone that is seen as a whole
+constexpr double kRoomAroundBone = 1.05;              // of a bone that is seen as a whole
 constexpr int kPresets = 3;                           // the entry after them is that of another window
 
 constexpr std::array<HuWindow, kPresets> kWindows{kBoneWindow, kSoftTissueWindow, kWideWindow};
 
-QString number(double value, int decimals) {
+QString rounded_text(double value, int decimals) {
   const double step = std::pow(10.0, -decimals);
   return QLocale().toString(std::round(value / step) * step + 0.0, 'f', decimals);
 }
@@ -197,7 +197,7 @@ LinkedSlices SlicesPanel::view() const {
   if (now.axes == SliceAxes::tool) {
     fit = kToolField_mm / std::max(1, std::min(views_[0]->width(), views_[0]->height()));
   } else if (!bone_.empty()) {
-    const Vec3 size = kMargin * bone_.size_mm();
+    const Vec3 size = kRoomAroundBone * bone_.size_mm();
     const std::array<std::pair<int, int>, kSlices> sides{{{0, 1}, {0, 2}, {1, 2}}};  // of the image: right, down
     for (std::size_t i = 0; i < kSlices; ++i)
       fit = std::max({fit, size[sides[i].first] / std::max(1, views_[i]->width()),
@@ -262,10 +262,10 @@ void SlicesPanel::choose_window() {
 void SlicesPanel::show_hu(std::size_t slice, const std::optional<Vec3>& point_mm) {
   hovered_ = point_mm ? std::optional(std::pair(slice, *point_mm)) : std::nullopt;
   const auto hu = hovered_ ? views_[slice]->hu_at(*point_mm) : std::nullopt;
-  hu_->setText(
-      hu ? tr("%1 HU at %2, %3, %4 mm")
-               .arg(number(*hu, 0), number(point_mm->x(), 1), number(point_mm->y(), 1), number(point_mm->z(), 1))
-         : QString());
+  hu_->setText(hu ? tr("%1 HU at %2, %3, %4 mm")
+                        .arg(rounded_text(*hu, 0), rounded_text(point_mm->x(), 1), rounded_text(point_mm->y(), 1),
+                             rounded_text(point_mm->z(), 1))
+                  : QString());
 }
 
 void SlicesPanel::show_images() {

@@ -3,8 +3,10 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <atomic>
+#include <cmath>
 #include <condition_variable>
 #include <deque>
 #include <fstream>
@@ -330,8 +332,10 @@ TEST(InsideOfAScannedCase, HasTheHuOfTheScanInItsFolder) {
   inside->add(copy);
   ASSERT_TRUE(wait_until([&] { return copy->calls() > 0; }, kPatience));
   EXPECT_TRUE(inside->status().from_scan);
+  // The scan's box is larger than the bone's. Only samples beyond the faces of its outer voxels are air.
   const std::vector<float> values = copy->is();
-  EXPECT_NEAR(static_cast<double>(values[values.size() / 2]), 1000.0, 1.0);
+  const auto scanned_hu = std::ranges::count_if(values, [](float hu) { return std::abs(hu - 1000.0f) < 1.0f; });
+  EXPECT_GT(static_cast<double>(scanned_hu), 0.85 * static_cast<double>(values.size()));
 }
 
 TEST(InsideOfAScannedCase, HasThoseOfItsDensityWhenTheScanIsDamaged) {
