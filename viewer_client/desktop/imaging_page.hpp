@@ -8,6 +8,7 @@
 #include <functional>
 #include <vector>
 
+#include "viewer_client/desktop/imaging_histogram.hpp"
 #include "viewer_client/desktop/imaging_plane.hpp"
 #include "viewer_client/desktop/imaging_steps.hpp"
 #include "viewer_client/imaging/edit_history.hpp"
@@ -57,7 +58,7 @@ class ImagingPage : public QWidget {
   void end_work(const QString& sentence);
   void show_series(const std::vector<ListedSeries>& series);
   void read_row(const QListWidgetItem* item);
-  void show_scan(ShownScan scan);
+  void show_scan(ShownScan scan, const HuHistogram& histogram);
   void show_islands(std::vector<ListedIsland> list, IslandMap map);
   void find_islands();
   void make_bone();
@@ -94,6 +95,7 @@ class ImagingPage : public QWidget {
   QPushButton *cancel_, *back_, *keep_, *undo_, *redo_, *make_;
   QComboBox* preset_;
   QSpinBox* threshold_;
+  ImagingHistogram* histogram_;
   std::array<ImagingPlane*, 3> planes_{};
   QTimer threshold_timer_;  // the user has stopped to change the threshold
 };

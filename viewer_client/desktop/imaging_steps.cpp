@@ -148,12 +148,16 @@ void ImagingSteps::read(std::optional<int> series) {
   QStringList arguments{"export-scan", source_, scratch_file(kScanFile)};
   if (series) arguments << "--series" << QString::number(*series);
   start(arguments, [this](const QString&) {
-    in_background([this] { scan_ = read_scan_file(scratch_ / kScanFile); },
-                  [this] {
-                    Result<ShownScan> scan = *std::exchange(scan_, std::nullopt);
-                    if (!scan) return fail(QString::fromStdString(scan.error().message));
-                    events_.read(std::move(*scan));
-                  });
+    in_background(
+        [this] {
+          scan_ = read_scan_file(scratch_ / kScanFile);
+          if (*scan_) histogram_ = histogram_of(**scan_);
+        },
+        [this] {
+          Result<ShownScan> scan = *std::exchange(scan_, std::nullopt);
+          if (!scan) return fail(QString::fromStdString(scan.error().message));
+          events_.read(std::move(*scan), histogram_);
+        });
   });
 }
 
