@@ -298,8 +298,8 @@ void ImagingPage::show_islands(std::vector<ListedIsland> list, IslandMap map) {
   islands_ = std::move(list);
   scene_.islands = std::move(map);
   found_hu_ = history_.now().threshold_hu;
-  if (!threshold_timer_.isActive()) scene_.look.threshold_hu.reset();
   end_work(tr("Double-click a bone, or tick it in the list, and make it."));
+  if (threshold_timer_.isActive()) return refresh_list();  // the user chooses another threshold meanwhile
   follow_edits();
 }
 
