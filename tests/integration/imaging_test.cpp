@@ -83,6 +83,7 @@ class ImagingTest : public test::WindowBench {
     ASSERT_TRUE(until([&] { return list.isVisible() && list.count() == 1; })) << words();
     choose_series(list);
     ASSERT_TRUE(until([&] { return found(parts); })) << words();
+    part<QSlider>("slice_axial").setValue(12);
   }
   void choose_series(QListWidget& list) {
     ++clicks_;
@@ -146,6 +147,8 @@ TEST_F(ImagingTest, FromAFolderToADrillableBoneInTenClicks) {
   ASSERT_TRUE(until([&] { return found(2); })) << words();
   EXPECT_FALSE(part<QPushButton>("make_bone").isEnabled());
 
+  // The planes go through one of the balls.
+  EXPECT_TRUE(label("readout").startsWith("1000 HU")) << label("readout").toStdString();
   // The ball on the patient's left is on the right of the axial plane.
   ImagingPlane& axial = plane("plane_axial");
   const QPoint at = axial.pixel(ball(1));

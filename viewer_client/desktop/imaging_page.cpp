@@ -232,7 +232,7 @@ void ImagingPage::open_source(const QString& source) {
   series_.clear();
   series_list_->clear();
   history_ = {};
-  found_hu_ = 0.0;
+  found_hu_.reset();
   stack_->setCurrentIndex(kNothingOpen);
   show_work(tr("Searching %1").arg(source));
   steps_.open(source);
@@ -297,10 +297,19 @@ void ImagingPage::find_islands() {
 void ImagingPage::show_islands(std::vector<ListedIsland> list, IslandMap map) {
   islands_ = std::move(list);
   scene_.islands = std::move(map);
+  const bool first = !found_hu_;
   found_hu_ = history_.now().threshold_hu;
+  if (first) show_largest_bone();
   end_work(tr("Double-click a bone, or tick it in the list, and make it."));
   if (threshold_timer_.isActive()) return refresh_list();  // the user chooses another threshold meanwhile
   follow_edits();
+}
+
+void ImagingPage::show_largest_bone() {
+  const auto bone = std::ranges::find(islands_, "bone", &ListedIsland::kind);
+  if (bone == islands_.end()) return;
+  const auto centre = voxel_of(scene_.scan.geometry, bone->centre_mm).value_or(scene_.crosshair);
+  if (const auto seed = scene_.islands.seed_near(scene_.scan, bone->number, *found_hu_, centre)) look_at(*seed);
 }
 
 void ImagingPage::look_at(const std::array<int, 3>& voxel) {
@@ -356,7 +365,7 @@ void ImagingPage::keep_at(const std::array<int, 3>& voxel) {
   if (!keep_->isEnabled()) return;
   const int island = scene_.islands.number(voxel);
   const auto seed = island == 0 ? std::optional<std::array<int, 3>>()
-                                : scene_.islands.seed_near(scene_.scan, island, found_hu_, voxel);
+                                : scene_.islands.seed_near(scene_.scan, island, *found_hu_, voxel);
   if (!seed) return words_->setText(tr("There is no bone at the crosshair. Move it into a tinted part."));
   ImagingEdits edits = history_.now();
   const Vec3 at_mm = centre_of(scene_.scan.geometry, *seed);
@@ -377,7 +386,7 @@ void ImagingPage::change_island(const QListWidgetItem* item) {
   if (keep) {
     const auto centre = voxel_of(scene_.scan.geometry, island.centre_mm);
     const auto seed =
-        scene_.islands.seed_near(scene_.scan, island.number, found_hu_, centre.value_or(scene_.crosshair));
+        scene_.islands.seed_near(scene_.scan, island.number, *found_hu_, centre.value_or(scene_.crosshair));
     if (seed) edits.seeds_mm.push_back(centre_of(scene_.scan.geometry, *seed));
   } else {
     std::erase_if(edits.seeds_mm, [&](const Vec3& seed) {

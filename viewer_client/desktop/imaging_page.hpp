@@ -6,6 +6,7 @@
 #include <array>
 #include <filesystem>
 #include <functional>
+#include <optional>
 #include <vector>
 
 #include "viewer_client/desktop/imaging_histogram.hpp"
@@ -61,6 +62,7 @@ class ImagingPage : public QWidget {
   void show_scan(ShownScan scan, const HuHistogram& histogram);
   void show_islands(std::vector<ListedIsland> list, IslandMap map);
   void find_islands();
+  void show_largest_bone();
   void make_bone();
 
   void look_at(const std::array<int, 3>& voxel);
@@ -82,7 +84,7 @@ class ImagingPage : public QWidget {
   ImagingScene scene_;
   EditHistory history_;
   std::vector<ListedIsland> islands_;
-  double found_hu_ = 0.0;  // the threshold of the islands
+  std::optional<double> found_hu_;  // the threshold of the islands; nothing: none were found yet
   ImagingSteps steps_;
   QString wanted_source_;       // to open when the step at work has ended
   bool wants_islands_ = false;  // the same
