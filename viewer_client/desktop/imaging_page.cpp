@@ -309,7 +309,8 @@ void ImagingPage::show_largest_bone() {
   const auto bone = std::ranges::find(islands_, "bone", &ListedIsland::kind);
   if (bone == islands_.end()) return;
   const auto centre = voxel_of(scene_.scan.geometry, bone->centre_mm).value_or(scene_.crosshair);
-  if (const auto seed = scene_.islands.seed_near(scene_.scan, bone->number, *found_hu_, centre)) look_at(*seed);
+  if (const auto seed = scene_.islands.seed_near(scene_.scan, bone->number, found_hu_.value_or(0.0), centre))
+    look_at(*seed);
 }
 
 void ImagingPage::look_at(const std::array<int, 3>& voxel) {
@@ -365,7 +366,7 @@ void ImagingPage::keep_at(const std::array<int, 3>& voxel) {
   if (!keep_->isEnabled()) return;
   const int island = scene_.islands.number(voxel);
   const auto seed = island == 0 ? std::optional<std::array<int, 3>>()
-                                : scene_.islands.seed_near(scene_.scan, island, *found_hu_, voxel);
+                                : scene_.islands.seed_near(scene_.scan, island, found_hu_.value_or(0.0), voxel);
   if (!seed) return words_->setText(tr("There is no bone at the crosshair. Move it into a tinted part."));
   ImagingEdits edits = history_.now();
   const Vec3 at_mm = centre_of(scene_.scan.geometry, *seed);
@@ -385,8 +386,8 @@ void ImagingPage::change_island(const QListWidgetItem* item) {
   ImagingEdits edits = history_.now();
   if (keep) {
     const auto centre = voxel_of(scene_.scan.geometry, island.centre_mm);
-    const auto seed =
-        scene_.islands.seed_near(scene_.scan, island.number, *found_hu_, centre.value_or(scene_.crosshair));
+    const auto seed = scene_.islands.seed_near(scene_.scan, island.number, found_hu_.value_or(0.0),
+                                               centre.value_or(scene_.crosshair));
     if (seed) edits.seeds_mm.push_back(centre_of(scene_.scan.geometry, *seed));
   } else {
     std::erase_if(edits.seeds_mm, [&](const Vec3& seed) {

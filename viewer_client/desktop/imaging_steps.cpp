@@ -151,10 +151,10 @@ void ImagingSteps::read(std::optional<int> series) {
     in_background(
         [this] {
           scan_ = read_scan_file(scratch_ / kScanFile);
-          if (*scan_) histogram_ = histogram_of(**scan_);
+          if (scan_) histogram_ = histogram_of(*scan_);
         },
         [this] {
-          Result<ShownScan> scan = *std::exchange(scan_, std::nullopt);
+          Result<ShownScan> scan = std::exchange(scan_, ShownScan());
           if (!scan) return fail(QString::fromStdString(scan.error().message));
           events_.read(std::move(*scan), histogram_);
         });
@@ -176,7 +176,7 @@ void ImagingSteps::read_islands(const QString& said, const ScanGeometry& scan) {
             numbers ? IslandMap::make(scan, std::move(*numbers)) : Result<IslandMap>(tl::unexpected(numbers.error()));
       },
       [this, said] {
-        Result<IslandMap> map = *std::exchange(islands_, std::nullopt);
+        Result<IslandMap> map = std::exchange(islands_, IslandMap());
         if (!map) return fail(QString::fromStdString(map.error().message));
         events_.found(listed_islands(said), std::move(*map));
       });

@@ -75,9 +75,9 @@ class ImagingSteps : public QObject {
   std::unique_ptr<ImporterRun> run_;
   std::unique_ptr<CaseMaker> maker_;
   // The other thread writes these, and the GUI thread reads them when it has ended.
-  std::optional<Result<ShownScan>> scan_;
+  Result<ShownScan> scan_;
   HuHistogram histogram_;  // of the scan
-  std::optional<Result<IslandMap>> islands_;
+  Result<IslandMap> islands_;
   std::unique_ptr<QThread> loader_;
 };
 
