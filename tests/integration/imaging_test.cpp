@@ -27,6 +27,7 @@
 #include "tests/support/content.hpp"
 #include "tests/support/process.hpp"
 #include "tests/support/size_limit.hpp"
+#include "viewer_client/desktop/imaging_histogram.hpp"
 #include "viewer_client/desktop/imaging_page.hpp"
 #include "viewer_client/desktop/language.hpp"
 #include "viewer_client/desktop/library.hpp"
@@ -82,6 +83,7 @@ class ImagingTest : public test::WindowBench {
     ASSERT_TRUE(until([&] { return list.isVisible() && list.count() == 1; })) << words();
     choose_series(list);
     ASSERT_TRUE(until([&] { return found(parts); })) << words();
+    part<QSlider>("slice_axial").setValue(12);
   }
   void choose_series(QListWidget& list) {
     ++clicks_;
@@ -145,6 +147,8 @@ TEST_F(ImagingTest, FromAFolderToADrillableBoneInTenClicks) {
   ASSERT_TRUE(until([&] { return found(2); })) << words();
   EXPECT_FALSE(part<QPushButton>("make_bone").isEnabled());
 
+  // The planes go through one of the balls.
+  EXPECT_TRUE(label("readout").startsWith("1000 HU")) << label("readout").toStdString();
   // The ball on the patient's left is on the right of the axial plane.
   ImagingPlane& axial = plane("plane_axial");
   const QPoint at = axial.pixel(ball(1));
@@ -230,8 +234,9 @@ TEST_F(ImagingTest, EverythingCanBeUndoneAndDoneAgain) {
   EXPECT_EQ(ticks(), both);
   click("undo_edit");
   EXPECT_EQ(ticks(), first);
+  // A key presses the button for a moment.
   QTest::keySequence(window_.get(), QKeySequence::Undo);
-  EXPECT_EQ(ticks(), none);
+  EXPECT_TRUE(until([&] { return ticks() == none; }));
   EXPECT_FALSE(part<QPushButton>("undo_edit").isEnabled());
   EXPECT_FALSE(part<QPushButton>("make_bone").isEnabled());
   click("redo_edit");
@@ -246,6 +251,35 @@ TEST_F(ImagingTest, EverythingCanBeUndoneAndDoneAgain) {
   click("undo_edit");
   EXPECT_TRUE(until([&] { return found(2) && ticks() == std::vector<bool>({false, true}); })) << words();
   EXPECT_TRUE(part<QPushButton>("make_bone").isEnabled());
+}
+
+TEST_F(ImagingTest, TheLimitsOfTheHistogramAreDragged) {
+  open_scan(series("ct", two_balls()), 2);
+  auto& histogram = part<ImagingHistogram>("histogram");
+  const auto drag = [&](double from_hu, double to_hu) {
+    const QPoint from(histogram.pixel(from_hu), 20), to(histogram.pixel(to_hu), 20);
+    QTest::mousePress(&histogram, Qt::LeftButton, {}, from);
+    QMouseEvent move(QEvent::MouseMove, to, Qt::NoButton, Qt::LeftButton, {});
+    QApplication::sendEvent(&histogram, &move);
+    QTest::mouseRelease(&histogram, Qt::LeftButton, {}, to);
+  };
+  const double pixel_hu = 4096.0 / histogram.width();
+  ImagingPlane& axial = plane("plane_axial");
+  const QPoint muscle = axial.pixel({29, 20, 12}) + QPoint(-3, 0);
+  const auto colour = [&] { return QColor(axial.grab().toImage().pixel(muscle)); };
+  EXPECT_EQ(colour().red(), colour().blue());
+  drag(226.0, 0.0);
+  EXPECT_NEAR(part<QSpinBox>("threshold").value(), 0, pixel_hu);
+  // Muscle of 40 HU reaches it: the tint is there at once.
+  EXPECT_GT(colour().red(), colour().blue() + 20);
+  ASSERT_TRUE(until([&] { return found(1); })) << words();
+  click("undo_edit");
+  ASSERT_TRUE(until([&] { return found(2) && islands().isEnabled(); })) << words();
+  EXPECT_EQ(part<QSpinBox>("threshold").value(), 226);
+  // The lower end of the window, -500 HU, comes to -2 pixels of muscle: it gets nearly black.
+  drag(-500.0, 40.0 - 2.0 * pixel_hu);
+  EXPECT_LT(colour().red(), 255.0 * 3.0 * pixel_hu / 1000.0);
+  EXPECT_EQ(part<QComboBox>("window_preset").currentIndex(), -1);
 }
 
 TEST_F(ImagingTest, WhatIsNoCtIsRefusedWithOneSentence) {

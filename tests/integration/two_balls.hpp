@@ -1,7 +1,6 @@
 // A scan of two balls of bone that touch nothing, and of which everything is known.
 #pragma once
-#include <array>
-#include <cmath>
+#include <cstdint>
 #include <numbers>
 
 #include "common/imaging/hu_volume.hpp"
@@ -13,19 +12,6 @@ inline constexpr double kBall_mm3 = 4.0 / 3.0 * std::numbers::pi * kBall_mm * kB
 inline constexpr std::int16_t kBall_hu = 1000, kMuscle_hu = 40;
 
 // Balls in muscle, left and right of the middle, on voxels that are not cubes.
-inline imaging::HuVolume two_balls() {
-  imaging::HuVolume scan;
-  scan.dims = {60, 60, 24};
-  scan.spacing_mm = {0.9, 0.9, 1.5};
-  scan.origin_mm = -0.5 * scan.spacing_mm.cwiseProduct(Vec3(59, 59, 23));
-  for (int k = 0; k < scan.dims[2]; ++k)
-    for (int j = 0; j < scan.dims[1]; ++j)
-      for (int i = 0; i < scan.dims[0]; ++i) {
-        const Vec3 at = scan.position_mm(Vec3(i, j, k));
-        const bool bone = (Vec3(std::abs(at.x()), at.y(), at.z()) - Vec3(kApart_mm, 0, 0)).norm() <= kBall_mm;
-        scan.values.push_back(bone ? kBall_hu : kMuscle_hu);
-      }
-  return scan;
-}
+[[nodiscard]] imaging::HuVolume two_balls();
 
 }  // namespace osteon::test

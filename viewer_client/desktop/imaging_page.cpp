@@ -84,7 +84,7 @@ ImagingSteps::Events ImagingPage::step_events() {
             progress_->setValue(percent);
           },
           [this](const std::vector<ListedSeries>& series) { show_series(series); },
-          [this](ShownScan scan) { show_scan(std::move(scan)); },
+          [this](ShownScan scan, const HuHistogram& histogram) { show_scan(std::move(scan), histogram); },
           [this](std::vector<ListedIsland> list, IslandMap map) { show_islands(std::move(list), std::move(map)); },
           [this](const std::filesystem::path& bone) {
             events_.busy(false);
@@ -177,6 +177,9 @@ QBoxLayout* ImagingPage::make_side() {
   connect(threshold_, QOverload<int>::of(&QSpinBox::valueChanged), this, [this](int hu) { preview_threshold(hu); });
   form->addRow(tr("Threshold"), threshold_);
   column->addLayout(form);
+  histogram_ = new ImagingHistogram(
+      {[this](int hu) { threshold_->setValue(hu); }, [this](const GreyWindow& window) { change_window(window); }});
+  column->addWidget(histogram_);
   auto* heading = new QLabel(tr("Parts of bone. The ticked ones are kept:"));
   heading->setWordWrap(true);
   column->addWidget(heading);
@@ -190,7 +193,8 @@ QBoxLayout* ImagingPage::make_side() {
                      tr("Puts a seed there, from which the bone grows. Two seeds in one part separate it."),
                      [this] { keep_at(scene_.crosshair); });
   undo_ = add_button(*column, tr("&Undo the edit"), "undo_edit", tr("Takes the last edit back"), [this] {
-    history_.undo();
+    // A threshold that is still being changed is no edit yet.
+    if (!threshold_timer_.isActive()) history_.undo();
     follow_edits();
   });
   undo_->setShortcut(QKeySequence::Undo);
@@ -228,7 +232,7 @@ void ImagingPage::open_source(const QString& source) {
   series_.clear();
   series_list_->clear();
   history_ = {};
-  found_hu_ = 0.0;
+  found_hu_.reset();
   stack_->setCurrentIndex(kNothingOpen);
   show_work(tr("Searching %1").arg(source));
   steps_.open(source);
@@ -268,8 +272,9 @@ void ImagingPage::read_row(const QListWidgetItem* item) {
   steps_.read(series_[row].number);
 }
 
-void ImagingPage::show_scan(ShownScan scan) {
+void ImagingPage::show_scan(ShownScan scan, const HuHistogram& histogram) {
   scene_.scan = std::move(scan);
+  histogram_->set_histogram(histogram);
   const auto& dims = scene_.scan.geometry.dims;
   scene_.crosshair = {dims[0] / 2, dims[1] / 2, dims[2] / 2};
   stack_->setCurrentIndex(kWorkPage);
@@ -292,10 +297,20 @@ void ImagingPage::find_islands() {
 void ImagingPage::show_islands(std::vector<ListedIsland> list, IslandMap map) {
   islands_ = std::move(list);
   scene_.islands = std::move(map);
+  const bool first = !found_hu_;
   found_hu_ = history_.now().threshold_hu;
-  if (!threshold_timer_.isActive()) scene_.look.threshold_hu.reset();
+  if (first) show_largest_bone();
   end_work(tr("Double-click a bone, or tick it in the list, and make it."));
+  if (threshold_timer_.isActive()) return refresh_list();  // the user chooses another threshold meanwhile
   follow_edits();
+}
+
+void ImagingPage::show_largest_bone() {
+  const auto bone = std::ranges::find(islands_, "bone", &ListedIsland::kind);
+  if (bone == islands_.end()) return;
+  const auto centre = voxel_of(scene_.scan.geometry, bone->centre_mm).value_or(scene_.crosshair);
+  if (const auto seed = scene_.islands.seed_near(scene_.scan, bone->number, found_hu_.value_or(0.0), centre))
+    look_at(*seed);
 }
 
 void ImagingPage::look_at(const std::array<int, 3>& voxel) {
@@ -320,14 +335,17 @@ void ImagingPage::change_window(const HuWindow& window) {
   scene_.look.window = window;
   scene_.greys = GreyTable(window);
   const auto preset = std::ranges::find(kPresets, window);
+  histogram_->set_limits(threshold_->value(), window);
   preset_->setCurrentIndex(preset == kPresets.end() ? -1 : static_cast<int>(preset - kPresets.begin()));
   refresh_planes();
 }
 
 void ImagingPage::preview_threshold(int hu) {
   scene_.look.threshold_hu = hu;
+  histogram_->set_limits(hu, scene_.look.window);
   threshold_timer_.start();
   refresh_planes();
+  enable_parts();
 }
 
 void ImagingPage::apply_threshold() {
@@ -345,10 +363,10 @@ bool ImagingPage::kept(int island) const {
 }
 
 void ImagingPage::keep_at(const std::array<int, 3>& voxel) {
-  if (steps_.busy()) return;
+  if (!keep_->isEnabled()) return;
   const int island = scene_.islands.number(voxel);
   const auto seed = island == 0 ? std::optional<std::array<int, 3>>()
-                                : scene_.islands.seed_near(scene_.scan, island, found_hu_, voxel);
+                                : scene_.islands.seed_near(scene_.scan, island, found_hu_.value_or(0.0), voxel);
   if (!seed) return words_->setText(tr("There is no bone at the crosshair. Move it into a tinted part."));
   ImagingEdits edits = history_.now();
   const Vec3 at_mm = centre_of(scene_.scan.geometry, *seed);
@@ -368,8 +386,8 @@ void ImagingPage::change_island(const QListWidgetItem* item) {
   ImagingEdits edits = history_.now();
   if (keep) {
     const auto centre = voxel_of(scene_.scan.geometry, island.centre_mm);
-    const auto seed =
-        scene_.islands.seed_near(scene_.scan, island.number, found_hu_, centre.value_or(scene_.crosshair));
+    const auto seed = scene_.islands.seed_near(scene_.scan, island.number, found_hu_.value_or(0.0),
+                                               centre.value_or(scene_.crosshair));
     if (seed) edits.seeds_mm.push_back(centre_of(scene_.scan.geometry, *seed));
   } else {
     std::erase_if(edits.seeds_mm, [&](const Vec3& seed) {
@@ -384,6 +402,7 @@ void ImagingPage::change_island(const QListWidgetItem* item) {
 void ImagingPage::follow_edits() {
   const QSignalBlocker quiet(threshold_);
   threshold_->setValue(static_cast<int>(history_.now().threshold_hu));
+  histogram_->set_limits(history_.now().threshold_hu, scene_.look.window);
   threshold_timer_.stop();
   if (history_.now().threshold_hu != found_hu_) {
     scene_.look.threshold_hu = history_.now().threshold_hu;
@@ -418,7 +437,8 @@ void ImagingPage::refresh_planes() {
 }
 
 void ImagingPage::enable_parts() {
-  const bool free = !steps_.busy(), making = steps_.making();
+  const bool changing = threshold_timer_.isActive(), making = steps_.making();
+  const bool free = !steps_.busy() && !changing;
   const bool found = free && scene_.open() && !islands_.empty() && history_.now().threshold_hu == found_hu_;
   const QString wait = tr("osteon-import is at work. Wait for it, or cancel it.");
   const QString none = free ? tr("Choose a threshold that bone reaches.") : wait;
@@ -426,7 +446,7 @@ void ImagingPage::enable_parts() {
   set_enabled(*threshold_, !making, wait);
   set_enabled(*keep_, found, none);
   set_enabled(*island_list_, found, none);
-  set_enabled(*undo_, !making && history_.can_undo(), making ? wait : tr("There is nothing to undo."));
+  set_enabled(*undo_, !making && (changing || history_.can_undo()), making ? wait : tr("There is nothing to undo."));
   set_enabled(*redo_, !making && history_.can_redo(), making ? wait : tr("There is nothing to redo."));
   const bool some = !history_.now().seeds_mm.empty();
   set_enabled(*make_, found && some, found ? tr("Keep a bone first: double-click it, or tick it in the list.") : none);

@@ -6,8 +6,10 @@
 #include <array>
 #include <filesystem>
 #include <functional>
+#include <optional>
 #include <vector>
 
+#include "viewer_client/desktop/imaging_histogram.hpp"
 #include "viewer_client/desktop/imaging_plane.hpp"
 #include "viewer_client/desktop/imaging_steps.hpp"
 #include "viewer_client/imaging/edit_history.hpp"
@@ -57,9 +59,10 @@ class ImagingPage : public QWidget {
   void end_work(const QString& sentence);
   void show_series(const std::vector<ListedSeries>& series);
   void read_row(const QListWidgetItem* item);
-  void show_scan(ShownScan scan);
+  void show_scan(ShownScan scan, const HuHistogram& histogram);
   void show_islands(std::vector<ListedIsland> list, IslandMap map);
   void find_islands();
+  void show_largest_bone();
   void make_bone();
 
   void look_at(const std::array<int, 3>& voxel);
@@ -81,7 +84,7 @@ class ImagingPage : public QWidget {
   ImagingScene scene_;
   EditHistory history_;
   std::vector<ListedIsland> islands_;
-  double found_hu_ = 0.0;  // the threshold of the islands
+  std::optional<double> found_hu_;  // the threshold of the islands; nothing: none were found yet
   ImagingSteps steps_;
   QString wanted_source_;       // to open when the step at work has ended
   bool wants_islands_ = false;  // the same
@@ -94,6 +97,7 @@ class ImagingPage : public QWidget {
   QPushButton *cancel_, *back_, *keep_, *undo_, *redo_, *make_;
   QComboBox* preset_;
   QSpinBox* threshold_;
+  ImagingHistogram* histogram_;
   std::array<ImagingPlane*, 3> planes_{};
   QTimer threshold_timer_;  // the user has stopped to change the threshold
 };

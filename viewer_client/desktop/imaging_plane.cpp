@@ -108,7 +108,9 @@ void ImagingPlane::paintEvent(QPaintEvent* /*event*/) {
   const QRectF inside = all.adjusted(kMargin_px, kMargin_px, -kMargin_px, -kMargin_px);
   painter.drawText(inside, Qt::AlignLeft | Qt::AlignVCenter, QChar(letters.left));
   painter.drawText(inside, Qt::AlignRight | Qt::AlignVCenter, QChar(letters.right));
-  painter.drawText(inside, Qt::AlignHCenter | Qt::AlignTop, QChar(letters.top));
+  // Below the title, which may reach the middle.
+  painter.drawText(inside.adjusted(0, painter.fontMetrics().height(), 0, 0), Qt::AlignHCenter | Qt::AlignTop,
+                   QChar(letters.top));
   painter.drawText(inside, Qt::AlignHCenter | Qt::AlignBottom, QChar(letters.bottom));
   painter.drawText(inside, Qt::AlignLeft | Qt::AlignTop,
                    tr("%1, %2 of %3").arg(title_of(plane_)).arg(through + 1).arg(axes_.slices));

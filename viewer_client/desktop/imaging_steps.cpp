@@ -14,7 +14,7 @@ namespace osteon {
 
 namespace {
 
-constexpr const char* kScanFile = "scan.nrrd";
+constexpr const char* kVoxelFile = "scan.nrrd";
 constexpr const char* kIslandFile = "islands.nrrd";
 constexpr const char* kPictures = "pictures";
 // Files with one scan by the ends of their names. What is inside decides in osteon-import.
@@ -144,22 +144,26 @@ void ImagingSteps::read_series(const QString& said) {
 
 void ImagingSteps::read(std::optional<int> series) {
   series_ = series;
-  QFile::remove(scratch_file(kScanFile));
-  QStringList arguments{"export-scan", source_, scratch_file(kScanFile)};
+  QFile::remove(scratch_file(kVoxelFile));
+  QStringList arguments{"export-scan", source_, scratch_file(kVoxelFile)};
   if (series) arguments << "--series" << QString::number(*series);
   start(arguments, [this](const QString&) {
-    in_background([this] { scan_ = read_scan_file(scratch_ / kScanFile); },
-                  [this] {
-                    Result<ShownScan> scan = *std::exchange(scan_, std::nullopt);
-                    if (!scan) return fail(QString::fromStdString(scan.error().message));
-                    events_.read(std::move(*scan));
-                  });
+    in_background(
+        [this] {
+          scan_ = read_scan_file(scratch_ / kVoxelFile);
+          if (scan_) histogram_ = histogram_of(*scan_);
+        },
+        [this] {
+          Result<ShownScan> scan = std::exchange(scan_, ShownScan());
+          if (!scan) return fail(QString::fromStdString(scan.error().message));
+          events_.read(std::move(*scan), histogram_);
+        });
   });
 }
 
 void ImagingSteps::find(const ScanGeometry& scan, double threshold_hu) {
   QFile::remove(scratch_file(kIslandFile));
-  start({"islands", scratch_file(kScanFile), scratch_file(kIslandFile), "--threshold",
+  start({"islands", scratch_file(kVoxelFile), scratch_file(kIslandFile), "--threshold",
          QString::number(threshold_hu, 'g', 17)},
         [this, scan](const QString& said) { read_islands(said, scan); });
 }
@@ -172,7 +176,7 @@ void ImagingSteps::read_islands(const QString& said, const ScanGeometry& scan) {
             numbers ? IslandMap::make(scan, std::move(*numbers)) : Result<IslandMap>(tl::unexpected(numbers.error()));
       },
       [this, said] {
-        Result<IslandMap> map = *std::exchange(islands_, std::nullopt);
+        Result<IslandMap> map = std::exchange(islands_, IslandMap());
         if (!map) return fail(QString::fromStdString(map.error().message));
         events_.found(listed_islands(said), std::move(*map));
       });

@@ -15,6 +15,7 @@
 #include "viewer_client/desktop/importer_run.hpp"
 #include "viewer_client/desktop/library.hpp"
 #include "viewer_client/imaging/edit_history.hpp"
+#include "viewer_client/imaging/hu_histogram.hpp"
 #include "viewer_client/imaging/island_map.hpp"
 
 namespace osteon {
@@ -36,7 +37,7 @@ class ImagingSteps : public QObject {
   struct Events {
     std::function<void(int percent)> progress;
     std::function<void(const std::vector<ListedSeries>& series)> listed;
-    std::function<void(ShownScan scan)> read;
+    std::function<void(ShownScan scan, const HuHistogram& histogram)> read;
     std::function<void(std::vector<ListedIsland> list, IslandMap map)> found;
     std::function<void(const std::filesystem::path& bone)> made;
     std::function<void(const QString& sentence)> failed;  // empty: cancelled
@@ -74,8 +75,9 @@ class ImagingSteps : public QObject {
   std::unique_ptr<ImporterRun> run_;
   std::unique_ptr<CaseMaker> maker_;
   // The other thread writes these, and the GUI thread reads them when it has ended.
-  std::optional<Result<ShownScan>> scan_;
-  std::optional<Result<IslandMap>> islands_;
+  Result<ShownScan> scan_;
+  HuHistogram histogram_;  // of the scan
+  Result<IslandMap> islands_;
   std::unique_ptr<QThread> loader_;
 };
 

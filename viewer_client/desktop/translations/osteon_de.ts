@@ -569,6 +569,17 @@
     </message>
 </context>
 <context>
+    <name>ImagingHistogram</name>
+    <message>
+        <source>Histogram of the HU</source>
+        <translation>Histogramm der HU</translation>
+    </message>
+    <message>
+        <source>Drag the orange threshold, or the blue ends of the window.</source>
+        <translation>Ziehen Sie den orangen Schwellwert oder die blauen Enden des Fensters.</translation>
+    </message>
+</context>
+<context>
     <name>ImagingPage</name>
     <message>
         <source>table or headrest</source>
