@@ -56,8 +56,8 @@ TEST_F(Console, TurnsAndMovesWithinItsLimits) {
   console_.set_orbit(5.0);
   console_.set_tilt(-5.0);
   console_.set_translation(2, 1e9);
-  EXPECT_DOUBLE_EQ(console_.position().orbit_rad, std::numbers::pi);
-  EXPECT_DOUBLE_EQ(console_.position().tilt_rad, -kQuarter_rad);
+  EXPECT_NEAR(console_.position().orbit_rad, std::numbers::pi, 1e-9);
+  EXPECT_NEAR(console_.position().tilt_rad, -kQuarter_rad, 1e-9);
   EXPECT_EQ(console_.position().translation_mm, Vec3(0, 0, 200));
   console_.set_orbit(-0.4);
   const CArmPosition before = console_.position();

@@ -12,7 +12,7 @@ namespace {
 
 using Pictures = std::vector<std::shared_ptr<const CArmPicture>>;
 
-constexpr double kThick_mm = 10.0, kDensity_g_cm3 = 1.9;
+constexpr double kThick_mm = 20.0, kDensity_g_cm3 = 1.9;
 // The line of Rho 1995, of a case without one of its own.
 const double kBone_per_mm = radiology::attenuation_per_mm((kDensity_g_cm3 - 0.131) / 0.001067);
 // 1 µGy at 1 m, in 1 mm², of which 65 % count (intensifier_test.cpp).
@@ -53,7 +53,7 @@ class CArmPictures : public testing::Test {
   // A ball of 5 mm through the plate, at x.
   InsideChange bore(double x_mm) {
     const CutReport report =
-        field_.apply(test::straight_cut(*find_tool("burr-round-5"), {x_mm, 0, 3}, {x_mm, 0, -16}, {0, 0, -1}, ++cuts_));
+        field_.apply(test::straight_cut(*find_tool("burr-round-5"), {x_mm, 0, 3}, {x_mm, 0, -26}, {0, 0, -1}, ++cuts_));
     return {false, bone_.update(std::vector<const CutField*>{&field_},
                                 std::vector{ChangedLeaves{report.level, report.changed_leaves}})};
   }
@@ -79,7 +79,7 @@ class CArmPictures : public testing::Test {
         sum += std::exp(black + grey * (std::log(static_cast<double>(picture.contrast.white)) - black));
         count += 1.0;
       }
-    EXPECT_GT(count, 50.0);
+    EXPECT_GT(count, 10.0);
     return sum / count;
   }
 
@@ -163,23 +163,24 @@ TEST_F(CArmPictures, AfterCutsIsTheWholePicture) {
 // A drill that goes on, beside a pin that stays.
 TEST_F(CArmPictures, MetalMovesInThePicture) {
   MetalInBeam shapes;
-  const auto metal_at = [&](double z_mm) {
+  const auto metal_at = [&](double x_mm) {
     std::vector<CuttingState> states(2);
     states[0].tool_name = "drill-3.2";
-    states[0].pose_bone_tool = pose_along(Vec3(15, 0, z_mm), Vec3(0, 0.6, -0.8));
+    states[0].pose_bone_tool = pose_along(Vec3(x_mm, 10, 2), Vec3(0, 1, 0));
     states[1].tool_name = "pin-1";
     states[1].pose_bone_tool = pose_along(Vec3(-15, 0, 0), Vec3(0, 0.6, -0.8));
     return shapes.of(states, {});
   };
   Arm arm({.glare = 0.0});
   const auto without = arm.shoot(bone_, order_at(1, axial()), {.all = true}).back();
-  const auto with = arm.shoot(bone_, order_at(2, axial()), {}, metal_at(2.0)).back();
-  // 3.2 mm of steel along a slant of 0.8 let less than 1 in 1000 through.
-  EXPECT_LT(photons_at(*with, 15.0, 0.8), 0.2 * photons_at(*without, 15.0, 0.8));
+  const auto with = arm.shoot(bone_, order_at(2, axial()), {}, metal_at(15.0)).back();
+  // 3.2 mm of steel let 1 in 140 through: black. The bone is far from black.
+  EXPECT_LT(photons_at(*with, 15.0, 0.8), 1.05 * static_cast<double>(with->contrast.black));
+  EXPECT_LT(photons_at(*with, 15.0, 0.8), 0.9 * photons_at(*without, 15.0, 0.8));
   Arm glaring;
-  (void)glaring.shoot(bone_, order_at(3, axial()), {.all = true}, metal_at(2.0));
-  const auto moved = glaring.shoot(bone_, order_at(4, axial()), {}, metal_at(-4.0)).back();
-  EXPECT_EQ(moved->grey, fresh(order_at(4, axial()), metal_at(-4.0))->grey);
+  (void)glaring.shoot(bone_, order_at(3, axial()), {.all = true}, metal_at(15.0));
+  const auto moved = glaring.shoot(bone_, order_at(4, axial()), {}, metal_at(13.0)).back();
+  EXPECT_EQ(moved->grey, fresh(order_at(4, axial()), metal_at(13.0))->grey);
   const auto gone = glaring.shoot(bone_, order_at(5, axial())).back();
   EXPECT_EQ(gone->grey, fresh(order_at(5, axial()))->grey);
 }
