@@ -27,7 +27,7 @@ void ImagingHistogram::set_histogram(const HuHistogram& histogram) {
   update();
 }
 
-void ImagingHistogram::set_limits(double threshold_hu, const GreyWindow& window) {
+void ImagingHistogram::set_limits(double threshold_hu, const HuWindow& window) {
   threshold_hu_ = threshold_hu;
   window_ = window;
   update();
@@ -37,7 +37,7 @@ int ImagingHistogram::pixel(double hu) const { return static_cast<int>(std::lrou
 
 double ImagingHistogram::hu_of(Limit limit) const {
   if (limit == Limit::threshold) return threshold_hu_;
-  return window_.centre_hu + (limit == Limit::low ? -0.5 : 0.5) * window_.width_hu;
+  return window_.level_hu + (limit == Limit::low ? -0.5 : 0.5) * window_.width_hu;
 }
 
 void ImagingHistogram::paintEvent(QPaintEvent* /*event*/) {

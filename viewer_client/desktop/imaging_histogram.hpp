@@ -6,8 +6,8 @@
 #include <optional>
 #include <vector>
 
-#include "viewer_client/imaging/grey_window.hpp"
 #include "viewer_client/imaging/hu_histogram.hpp"
+#include "viewer_client/imaging/hu_window.hpp"
 
 namespace osteon {
 
@@ -18,12 +18,12 @@ class ImagingHistogram : public QWidget {
  public:
   struct Events {
     std::function<void(int hu)> threshold;
-    std::function<void(const GreyWindow& window)> window;
+    std::function<void(const HuWindow& window)> window;
   };
   explicit ImagingHistogram(Events events, QWidget* parent = nullptr);
 
   void set_histogram(const HuHistogram& histogram);
-  void set_limits(double threshold_hu, const GreyWindow& window);
+  void set_limits(double threshold_hu, const HuWindow& window);
   [[nodiscard]] int pixel(double hu) const;
   [[nodiscard]] QSize sizeHint() const override { return {250, 90}; }
   [[nodiscard]] QSize minimumSizeHint() const override { return {120, 60}; }
@@ -42,7 +42,7 @@ class ImagingHistogram : public QWidget {
   Events events_;
   std::vector<double> heights_;
   double threshold_hu_ = 0.0;
-  GreyWindow window_;
+  HuWindow window_;
   std::optional<Limit> dragged_;
 };
 

@@ -178,7 +178,7 @@ QBoxLayout* ImagingPage::make_side() {
   form->addRow(tr("Threshold"), threshold_);
   column->addLayout(form);
   histogram_ = new ImagingHistogram(
-      {[this](int hu) { threshold_->setValue(hu); }, [this](const GreyWindow& window) { change_window(window); }});
+      {[this](int hu) { threshold_->setValue(hu); }, [this](const HuWindow& window) { change_window(window); }});
   column->addWidget(histogram_);
   auto* heading = new QLabel(tr("Parts of bone. The ticked ones are kept:"));
   heading->setWordWrap(true);
