@@ -23,7 +23,7 @@ namespace osteon {
 namespace {
 
 constexpr int kThresholdPause_ms = 600, kThumbnail_px = 96, kListWidth_px = 250;
-constexpr std::array kPresets{kBoneWindow, kSoftTissueWindow, kWideWindow};
+constexpr std::array kImagingWindows{kBoneWindow, kSoftTissueWindow, kWideWindow};
 enum ImagingStackPage { kNothingOpen, kSeriesPage, kWorkPage };
 
 QString kind_text(const std::string& kind) {
@@ -165,7 +165,7 @@ QBoxLayout* ImagingPage::make_side() {
   preset_->setAccessibleName(tr("Window of the grey values"));
   preset_->addItems({tr("For bone"), tr("For soft tissue"), tr("All values")});
   connect(preset_, QOverload<int>::of(&QComboBox::activated), this,
-          [this](int index) { change_window(kPresets[static_cast<std::size_t>(index)]); });
+          [this](int index) { change_window(kImagingWindows[static_cast<std::size_t>(index)]); });
   form->addRow(tr("Window"), preset_);
   threshold_ = new QSpinBox;
   threshold_->setObjectName("threshold");
@@ -334,9 +334,9 @@ void ImagingPage::point_at(const std::array<int, 3>& voxel) {
 void ImagingPage::change_window(const HuWindow& window) {
   scene_.look.window = window;
   scene_.greys = GreyTable(window);
-  const auto preset = std::ranges::find(kPresets, window);
+  const auto preset = std::ranges::find(kImagingWindows, window);
   histogram_->set_limits(threshold_->value(), window);
-  preset_->setCurrentIndex(preset == kPresets.end() ? -1 : static_cast<int>(preset - kPresets.begin()));
+  preset_->setCurrentIndex(preset == kImagingWindows.end() ? -1 : static_cast<int>(preset - kImagingWindows.begin()));
   refresh_planes();
 }
 
