@@ -14,7 +14,7 @@ namespace osteon {
 
 namespace {
 
-constexpr int kMargin_px = 4, kPage = 10;
+constexpr int kPlaneMargin_px = 4, kPage = 10;
 constexpr int kWheelStep = 120;  // of Qt, for one notch
 constexpr QColor kCrosshair{90, 230, 140, 170}, kLetter{250, 220, 120};
 
@@ -70,7 +70,7 @@ void ImagingPlane::refresh() {
 
 int ImagingPlane::slice() const { return place_in(axes_, scene_.crosshair)[2]; }
 
-PlaneFrame ImagingPlane::frame() const { return fit(axes_, width() - slider_->width() - kMargin_px, height()); }
+PlaneFrame ImagingPlane::frame() const { return fit(axes_, width() - slider_->width() - kPlaneMargin_px, height()); }
 
 QPoint ImagingPlane::pixel(const std::array<int, 3>& voxel) const {
   const auto [column, row, slice] = place_in(axes_, voxel);
@@ -86,7 +86,7 @@ std::array<int, 3> ImagingPlane::voxel_under(const QPoint& at) const {
 void ImagingPlane::paintEvent(QPaintEvent* /*event*/) {
   QPainter painter(this);
   const PlaneFrame at = frame();
-  const QRectF all(0, 0, width() - slider_->width() - kMargin_px, height());
+  const QRectF all(0, 0, width() - slider_->width() - kPlaneMargin_px, height());
   painter.fillRect(all, Qt::black);
   if (!scene_.open()) return;
   if (drawn_slice_ != slice()) {
@@ -105,7 +105,7 @@ void ImagingPlane::paintEvent(QPaintEvent* /*event*/) {
   painter.drawLine(QPointF(x, picture.top()), QPointF(x, picture.bottom()));
   const PlaneLetters letters = letters_of(plane_);
   painter.setPen(kLetter);
-  const QRectF inside = all.adjusted(kMargin_px, kMargin_px, -kMargin_px, -kMargin_px);
+  const QRectF inside = all.adjusted(kPlaneMargin_px, kPlaneMargin_px, -kPlaneMargin_px, -kPlaneMargin_px);
   painter.drawText(inside, Qt::AlignLeft | Qt::AlignVCenter, QChar(letters.left));
   painter.drawText(inside, Qt::AlignRight | Qt::AlignVCenter, QChar(letters.right));
   // Below the title, which may reach the middle.
