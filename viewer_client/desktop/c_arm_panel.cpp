@@ -502,12 +502,15 @@ bool CArmPanel::eventFilter(QObject* watched, QEvent* event) {
     return QWidget::eventFilter(watched, event);
   const auto* key = static_cast<QKeyEvent*>(event);
   const PedalKey* pedal = pedal_of(key->key());
-  if (pedal == nullptr || key->modifiers() != Qt::NoModifier || QApplication::activeModalWidget() != nullptr)
+  if (pedal == nullptr) return QWidget::eventFilter(watched, event);
+  // Whatever was pressed or has opened meanwhile, a pedal that comes up lets go.
+  const bool comes_up = event->type() == QEvent::KeyRelease && console_.held() == pedal->mode;
+  if (!comes_up && (key->modifiers() != Qt::NoModifier || QApplication::activeModalWidget() != nullptr))
     return QWidget::eventFilter(watched, event);
   if (key->isAutoRepeat()) return true;
   if (event->type() == QEvent::KeyPress)
     press(pedal->mode);
-  else if (console_.held() == pedal->mode)
+  else if (comes_up)
     release();
   return true;
 }
