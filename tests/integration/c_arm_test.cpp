@@ -15,6 +15,7 @@
 #include <algorithm>
 #include <cmath>
 #include <fstream>
+#include <thread>
 
 #include "common/radiology/attenuation.hpp"
 #include "tests/integration/window_bench.hpp"
@@ -257,6 +258,18 @@ TEST_F(CArmTest, ShootsOnlyWhileItIsWantedAndLosesNothing) {
   EXPECT_TRUE(
       until([&] { return panel().save(file, true) && QImage(QString::fromStdString(file.string())).width() == 800; }));
   EXPECT_EQ(shots(), hidden);
+  // A picture that comes when X-rays are chosen again is there later. The window sees nothing meanwhile.
+  click("c_arm_axial");
+  std::this_thread::sleep_for(std::chrono::seconds(2));
+  window_->findChild<QComboBox*>("c_arm_kind")->setCurrentIndex(0);
+  QTest::qWait(200);
+  window_->findChild<QComboBox*>("c_arm_kind")->setCurrentIndex(1);
+  const fs::path before = desk_->temp() / "maximum-before.png";
+  fs::copy_file(file, before);
+  EXPECT_TRUE(until([&] {
+    return panel().save(file, true) && QImage(QString::fromStdString(file.string())).width() == 800 &&
+           test::content(file) != test::content(before);
+  }));
   window_->findChild<QComboBox*>("c_arm_kind")->setCurrentIndex(0);
   EXPECT_TRUE(button("c_arm_shot")->isEnabled());
   (void)shoot();

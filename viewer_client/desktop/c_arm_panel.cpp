@@ -417,8 +417,10 @@ std::vector<PlacedMetal> CArmPanel::metal_in_beam() {
 
 void CArmPanel::receive(const std::shared_ptr<const CArmPicture>& picture) {
   if (picture->order == 0) {
-    if (!maximum() || !in_room_) return;
+    if (!in_room_) return;
+    // Kept while X-rays are shown, too: it is not made again unless something changes.
     projection_ = image_of(*picture);
+    if (!maximum()) return;
     last_->show_picture(projection_);
     return show_status();
   }
