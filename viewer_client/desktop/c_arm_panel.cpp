@@ -350,6 +350,9 @@ void CArmPanel::enter(const Box& bone, const std::filesystem::path& session) {
 void CArmPanel::leave() {
   stop();
   in_room_ = false;
+  // Whoever has made room on the disk need not shoot again.
+  if (file_)
+    if (const Result<void> kept = file_->catch_up(); !kept) events_.say(QString::fromStdString(kept.error().message));
   file_.reset();
   metal_.reset();
   tools_known_ = 0;
