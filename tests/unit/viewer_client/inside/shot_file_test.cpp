@@ -65,6 +65,11 @@ TEST(ShotLine, WithoutAPossibleShotIsNone) {
       EXPECT_FALSE(shot_of(other.dump())) << name;
     }
   }
+  for (const std::uint64_t number : {std::uint64_t{0}, std::numeric_limits<std::uint64_t>::max()}) {
+    auto other = good;
+    other["number"] = number;
+    EXPECT_FALSE(shot_of(other.dump())) << number;
+  }
   auto flat = good;
   flat["isocentre_mm"] = {1, 2};
   EXPECT_FALSE(shot_of(flat.dump()));
