@@ -406,7 +406,10 @@ void CArmPanel::release() { console_.release(); }
 
 void CArmPanel::tick() {
   const std::optional<ShotOrder> order = console_.due(CArmConsole::Clock::now());
-  if (!order) return;
+  if (!order) {
+    if (console_.idle()) pedal_timer_.stop();
+    return;
+  }
   image_->make(*order, QDateTime::currentMSecsSinceEpoch(), metal_in_beam());
   inside_.wake();
 }
