@@ -268,6 +268,11 @@ TEST_F(SlicesTest, SayThatTheConnectionIsLost) {
   open();
   trigger("slices");
   ASSERT_TRUE(until([&] { return shown(); })) << problem();
+  // Slices that nobody sees do not follow the bone, so they are new when somebody looks again.
+  trigger("slices");
+  EXPECT_EQ(slices_[0]->image(), nullptr);
+  trigger("slices");
+  ASSERT_TRUE(until([&] { return shown(); })) << problem();
   const auto servers = test::children("osteon-server");
   ASSERT_EQ(servers.size(), 1u);
   ::kill(servers.front(), SIGKILL);

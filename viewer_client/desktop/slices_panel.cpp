@@ -373,6 +373,9 @@ void SlicesPanel::showEvent(QShowEvent* event) {
 void SlicesPanel::hideEvent(QHideEvent* event) {
   QWidget::hideEvent(event);
   if (inside_) inside_->set_visible(painter_, false);
+  // The bone may change before somebody looks again.
+  painter_->clear();
+  show_images();
 }
 
 // Beside each other in a wide panel, one below the other in a high one.
