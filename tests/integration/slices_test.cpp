@@ -36,7 +36,10 @@ class SlicesTest : public test::WindowBench {
  protected:
   void SetUp() override {
     QSettings().setValue("tour/seen", true);
+    // What is no window of HU, as in a damaged file.
     QSettings().remove("slices");
+    QSettings().setValue("slices/level", "nan");
+    QSettings().setValue("slices/width", "inf");
     WindowBench::SetUp();
     panel_ = window_->findChild<SlicesPanel*>();
     ASSERT_NE(panel_, nullptr);
