@@ -175,7 +175,8 @@ void SlicesPanel::reset(const Box& bone, double pitch_mm) {
   hovered_.reset();
   hu_->clear();
   point_.reset(bone.empty() ? Vec3(Vec3::Zero()) : bone.centre_mm());
-  centre_mm_ = point_.point_mm();
+  overlay_.point_mm = centre_mm_ = point_.point_mm();
+  for (SliceView* view : views_) view->show_overlay(overlay_);
   show_images();
   ask();
 }
