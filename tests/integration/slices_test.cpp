@@ -38,7 +38,10 @@ class SlicesTest : public test::WindowBench {
  protected:
   void SetUp() override {
     QSettings().setValue("tour/seen", true);
+    // What is no window of HU, as in a damaged file.
     QSettings().remove("slices");
+    QSettings().setValue("slices/level", "nan");
+    QSettings().setValue("slices/width", "inf");
     WindowBench::SetUp();
     panel_ = window_->findChild<SlicesPanel*>();
     ASSERT_NE(panel_, nullptr);
@@ -269,6 +272,11 @@ TEST_F(SlicesTest, AreLedByMouseWheelAndSliderAndStayLinked) {
 // What a server without a word shows: the slices as they were, and why.
 TEST_F(SlicesTest, SayThatTheConnectionIsLost) {
   open();
+  trigger("slices");
+  ASSERT_TRUE(until([&] { return shown(); })) << problem();
+  // Slices that nobody sees do not follow the bone, so they are new when somebody looks again.
+  trigger("slices");
+  EXPECT_EQ(slices_[0]->image(), nullptr);
   trigger("slices");
   ASSERT_TRUE(until([&] { return shown(); })) << problem();
   const auto servers = test::children("osteon-server");

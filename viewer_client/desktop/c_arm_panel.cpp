@@ -350,6 +350,9 @@ void CArmPanel::enter(const Box& bone, const std::filesystem::path& session) {
 void CArmPanel::leave() {
   stop();
   in_room_ = false;
+  // Whoever has made room on the disk need not shoot again.
+  if (file_)
+    if (const Result<void> kept = file_->catch_up(); !kept) events_.say(QString::fromStdString(kept.error().message));
   file_.reset();
   metal_.reset();
   tools_known_ = 0;
@@ -403,7 +406,10 @@ void CArmPanel::release() { console_.release(); }
 
 void CArmPanel::tick() {
   const std::optional<ShotOrder> order = console_.due(CArmConsole::Clock::now());
-  if (!order) return;
+  if (!order) {
+    if (console_.idle()) pedal_timer_.stop();
+    return;
+  }
   image_->make(*order, QDateTime::currentMSecsSinceEpoch(), metal_in_beam());
   inside_.wake();
 }
@@ -417,8 +423,10 @@ std::vector<PlacedMetal> CArmPanel::metal_in_beam() {
 
 void CArmPanel::receive(const std::shared_ptr<const CArmPicture>& picture) {
   if (picture->order == 0) {
-    if (!maximum() || !in_room_) return;
+    if (!in_room_) return;
+    // Kept while X-rays are shown, too: it is not made again unless something changes.
     projection_ = image_of(*picture);
+    if (!maximum()) return;
     last_->show_picture(projection_);
     return show_status();
   }
@@ -502,12 +510,15 @@ bool CArmPanel::eventFilter(QObject* watched, QEvent* event) {
     return QWidget::eventFilter(watched, event);
   const auto* key = static_cast<QKeyEvent*>(event);
   const PedalKey* pedal = pedal_of(key->key());
-  if (pedal == nullptr || key->modifiers() != Qt::NoModifier || QApplication::activeModalWidget() != nullptr)
+  if (pedal == nullptr) return QWidget::eventFilter(watched, event);
+  // Whatever was pressed or has opened meanwhile, a pedal that comes up lets go.
+  const bool comes_up = event->type() == QEvent::KeyRelease && console_.held() == pedal->mode;
+  if (!comes_up && (key->modifiers() != Qt::NoModifier || QApplication::activeModalWidget() != nullptr))
     return QWidget::eventFilter(watched, event);
   if (key->isAutoRepeat()) return true;
   if (event->type() == QEvent::KeyPress)
     press(pedal->mode);
-  else if (console_.held() == pedal->mode)
+  else if (comes_up)
     release();
   return true;
 }

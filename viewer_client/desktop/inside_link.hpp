@@ -13,7 +13,7 @@ namespace osteon {
 
 class RoomLink;
 
-// [GUI thread] It never waits for the bone.
+// [GUI thread] It never waits for the bone. When a painter's picture is hidden, it waits until that painter rests.
 class InsideLink : public QObject {
  public:
   ~InsideLink() override;

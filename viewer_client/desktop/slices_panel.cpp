@@ -61,8 +61,9 @@ SlicesPanel::SlicesPanel(InsideLink& inside, QWidget* parent) : QWidget(parent),
   axes_->setCurrentIndex(settings.value("slices/axes", 0).toInt() == 1 ? 1 : 0);
   const HuWindow kept{settings.value("slices/level", kBoneWindow.level_hu).toDouble(),
                       settings.value("slices/width", kBoneWindow.width_hu).toDouble()};
+  const bool numbers = std::isfinite(kept.level_hu) && std::isfinite(kept.width_hu);
   set_axes();
-  set_window(dragged(kept, 0.0, 0.0));  // within the limits, whatever the file says
+  set_window(dragged(numbers ? kept : kBoneWindow, 0.0, 0.0));  // within the limits, whatever the file says
 }
 
 void SlicesPanel::add_choices(QBoxLayout& all) {
@@ -174,7 +175,8 @@ void SlicesPanel::reset(const Box& bone, double pitch_mm) {
   hovered_.reset();
   hu_->clear();
   point_.reset(bone.empty() ? Vec3(Vec3::Zero()) : bone.centre_mm());
-  centre_mm_ = point_.point_mm();
+  overlay_.point_mm = centre_mm_ = point_.point_mm();
+  for (SliceView* view : views_) view->show_overlay(overlay_);
   show_images();
   ask();
 }
@@ -373,6 +375,9 @@ void SlicesPanel::showEvent(QShowEvent* event) {
 void SlicesPanel::hideEvent(QHideEvent* event) {
   QWidget::hideEvent(event);
   if (inside_) inside_->set_visible(painter_, false);
+  // The bone may change before somebody looks again.
+  painter_->clear();
+  show_images();
 }
 
 // Beside each other in a wide panel, one below the other in a high one.

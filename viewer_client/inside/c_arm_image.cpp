@@ -62,9 +62,11 @@ void CArmImage::drop() {
   waiting_.reset();
 }
 
-bool CArmImage::outdated(const CArmPosition& position) const {
+bool CArmImage::outdated(const CArmPosition& position, Projection projection) const {
   const MutexLock lock(mutex_);
-  return (waiting_ && !(waiting_->order.position == position)) || (maximum_ && !(*maximum_ == position));
+  if (waiting_ && !(waiting_->order.position == position)) return true;
+  // The whole picture of a shot comes all the same: somebody waits for it.
+  return projection == Projection::most && maximum_ && !(*maximum_ == position);
 }
 
 // [inside thread]
@@ -77,8 +79,8 @@ void CArmImage::paint(const radiology::BoneHu& bone, const InsideChange& change,
     request = std::exchange(waiting_, std::nullopt);
     maximum = maximum_;
   }
-  if (request) return shoot(bone, std::move(*request), keep_going);
-  if (maximum) show_projection(bone, *maximum, keep_going);
+  if (request) shoot(bone, std::move(*request), keep_going);
+  if (maximum && keep_going(0.95)) show_projection(bone, *maximum, keep_going);
 }
 
 void CArmImage::note(const InsideChange& change) {
@@ -139,7 +141,7 @@ void CArmImage::shoot(const radiology::BoneHu& bone, Request request, const Keep
   if (!coarse) return;
   renew(*coarse, request.metal, {coarse->image.beam().detector.whole()});
   show_shot(*coarse, shot, order.id, true);
-  if (!keep_going(0.5) || outdated(order.position)) return;
+  if (!keep_going(0.5) || outdated(order.position, Projection::attenuation)) return;
   fine_ = cast(bone, order.position, 1, Projection::attenuation);
   changed_ = {};
   if (!keep_going(0.9)) return;
@@ -159,7 +161,7 @@ void CArmImage::show_projection(const radiology::BoneHu& bone, const CArmPositio
   const std::optional<Layers> coarse = cast(bone, position, kCoarser, Projection::most);
   if (!coarse) return;
   show_maximum_of(*coarse, true);
-  if (!keep_going(0.5) || outdated(position)) return;
+  if (!keep_going(0.5) || outdated(position, Projection::most)) return;
   fine_ = cast(bone, position, 1, Projection::most);
   changed_ = {};
   show_maximum_of(*fine_, false);

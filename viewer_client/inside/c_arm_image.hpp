@@ -74,7 +74,7 @@ class CArmImage final : public InsidePainter {
   void show_shot(const Layers& layers, CArmShot& shot, std::uint64_t order, bool coarse) const;
   void show_maximum_of(const Layers& layers, bool coarse) const;
   // Something newer waits, so that a whole picture from this position is not worth its time.
-  [[nodiscard]] bool outdated(const CArmPosition& position) const;
+  [[nodiscard]] bool outdated(const CArmPosition& position, radiology::Projection projection) const;
 
   const Shown shown_;
   const radiology::Intensifier intensifier_;

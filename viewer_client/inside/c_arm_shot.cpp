@@ -58,7 +58,8 @@ class ShotFields {
 };
 
 constexpr double kMostTurn_rad = 100.0, kMostOfShot = 1e9;
-constexpr double kLatest_unix_ms = 1e14;  // in three thousand years
+constexpr double kLatest_unix_ms = 1e14;                        // in three thousand years
+constexpr std::uint64_t kMostNumber = std::uint64_t{1} << 53U;  // the next one is a number too, in any language
 
 }  // namespace
 
@@ -108,7 +109,7 @@ std::optional<CArmShot> shot_of(std::string_view line) {
   shot.air_kerma_at_metre_ugy = fields.number("air_kerma_at_metre_ugy", 0.0, kMostOfShot);
   shot.dose_area_gy_cm2 = fields.number("dose_area_gy_cm2", 0.0, kMostOfShot);
   shot.seed = fields.whole("seed");
-  if (!fields.good()) return {};
+  if (!fields.good() || shot.number < 1 || shot.number > kMostNumber) return {};
   return shot;
 }
 

@@ -128,12 +128,12 @@ void InsideBone::Impl::live() {
     paint();
     say(seen);
     rest(begun);
-    held->wait(
-        [this](const HeldBoneStatus& now) {
-          return ending || woken || now.room_seq != seen.room_seq || now.state != seen.state ||
-                 now.asked_again != seen.asked_again;
-        },
-        kLongestWait);
+    const auto due = [this](const HeldBoneStatus& now) {
+      return ending || woken || now.room_seq != seen.room_seq || now.state != seen.state ||
+             now.asked_again != seen.asked_again;
+    };
+    while (!held->wait(due, kLongestWait)) {
+    }
   }
 }
 

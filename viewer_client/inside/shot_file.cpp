@@ -101,6 +101,13 @@ Result<void> ShotFile::add(const CArmShot& shot) {
   return written || first ? written : Result<void>();
 }
 
+Result<void> ShotFile::catch_up() {
+  if (waiting_ == 0) return {};
+  Result<void> written = write();
+  said_ = !written.has_value();
+  return written;
+}
+
 Result<void> ShotFile::write() {
   AppendedFile file(file_);
   int reason = file.reason();

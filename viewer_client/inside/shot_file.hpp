@@ -32,6 +32,8 @@ class ShotFile {
   // Appends the shot, after those that could not be written before. A line is written completely or not at all. Error:
   // internal, naming the file, the reason and the remedy, once until writing works again. In between it is quiet.
   [[nodiscard]] Result<void> add(const CArmShot& shot);
+  // Writes those that could not be written before, if any. The same error, also if it was said.
+  [[nodiscard]] Result<void> catch_up();
   [[nodiscard]] std::size_t waiting() const { return waiting_; }  // shots that are not in the file yet
 
  private:

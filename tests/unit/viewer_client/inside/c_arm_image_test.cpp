@@ -232,7 +232,15 @@ TEST_F(CArmPictures, MaximumIntensityFollowsCutsWithoutAShot) {
   arm.image.show_maximum(axial(0.3));
   EXPECT_EQ(arm.paint(bone_, {}).size(), 2u) << "another place";
   // X-rays of the same place come from layers of their own.
-  EXPECT_EQ(arm.shoot(bone_, order_at(9, axial(0.3))).back()->grey, fresh(order_at(9, axial(0.3)))->grey);
+  const Pictures four = arm.shoot(bone_, order_at(9, axial(0.3)));
+  ASSERT_EQ(four.size(), 4u);
+  EXPECT_EQ(four[1]->grey, fresh(order_at(9, axial(0.3)))->grey);
+  EXPECT_EQ(four[3]->order, 0u);
+  // Somebody waits for the whole picture of a shot, wherever maximum intensity is looked for.
+  const Pictures whole = arm.shoot(bone_, order_at(10, axial(0.5)));
+  ASSERT_EQ(whole.size(), 4u);
+  EXPECT_EQ(whole[1]->order, 10u);
+  EXPECT_FALSE(whole[1]->coarse);
   arm.image.show_maximum(std::nullopt);
   EXPECT_TRUE(arm.paint(bone_, bore(9.0)).empty());
 }

@@ -211,7 +211,7 @@ TEST_F(Inside, CallsAPainterAtAWakeAndWithTheWholeBoneFirst) {
   EXPECT_EQ(first->wholes(), 1);
   std::this_thread::sleep_for(50ms);
   const int calls = first->calls();
-  std::this_thread::sleep_for(100ms);
+  std::this_thread::sleep_for(800ms);  // longer than the thread waits at a time
   EXPECT_EQ(first->calls(), calls) << "nothing happens without a reason";
   inside->wake();
   ASSERT_TRUE(wait_until([&] { return first->calls() > calls; }, kPatience));

@@ -65,6 +65,11 @@ TEST(ShotLine, WithoutAPossibleShotIsNone) {
       EXPECT_FALSE(shot_of(other.dump())) << name;
     }
   }
+  for (const std::uint64_t number : {std::uint64_t{0}, std::numeric_limits<std::uint64_t>::max()}) {
+    auto other = good;
+    other["number"] = number;
+    EXPECT_FALSE(shot_of(other.dump())) << number;
+  }
   auto flat = good;
   flat["isocentre_mm"] = {1, 2};
   EXPECT_FALSE(shot_of(flat.dump()));
@@ -120,8 +125,14 @@ TEST(ShotFile, SaysOnceThatTheDiskIsFullAndWritesAllLater) {
   ASSERT_TRUE(file.add(shot_number(4)));
   EXPECT_EQ(file.waiting(), 0u);
   EXPECT_EQ(ShotFile(temp.path()).read().shots, shots_to(4));
-  const test::SizeLimit small(0);
-  EXPECT_FALSE(file.add(shot_number(5))) << "a new fault is said again";
+  {
+    const test::SizeLimit small(0);
+    EXPECT_FALSE(file.add(shot_number(5))) << "a new fault is said again";
+    EXPECT_FALSE(file.catch_up());
+  }
+  EXPECT_TRUE(file.catch_up());
+  EXPECT_TRUE(file.catch_up()) << "there is nothing more to write";
+  EXPECT_EQ(ShotFile(temp.path()).read().shots, shots_to(5));
 }
 
 TEST(ShotFile, WhatIsNoFileIsOneSentence) {
