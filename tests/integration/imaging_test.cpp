@@ -206,15 +206,15 @@ TEST_F(ImagingTest, TheRightButtonDragsTheWindowAndPresetsBringItBack) {
   // Between two balls and away from crosshair and letters.
   const QPoint muscle = axial.pixel({29, 20, 12}) + QPoint(-3, 0);
   const auto grey = [&] { return qGray(axial.grab().toImage().pixel(muscle)); };
-  // 40 HU in the window 400 +- 900: (40 - 399.5) / 1799 + 0.5 of white.
-  EXPECT_NEAR(grey(), 255.0 * ((40.0 - 399.5) / 1799.0 + 0.5), 1.5);
+  // 40 HU in the window 500 +- 1000.
+  EXPECT_NEAR(grey(), 255.0 * ((40.0 - 500.0) / 2000.0 + 0.5), 1.5);
   QTest::mousePress(&axial, Qt::RightButton, {}, muscle);
   QMouseEvent drag(QEvent::MouseMove, muscle + QPoint(0, 40), Qt::NoButton, Qt::RightButton, {});
   QApplication::sendEvent(&axial, &drag);
   QTest::mouseRelease(&axial, Qt::RightButton, {}, muscle + QPoint(0, 40));
   EXPECT_EQ(preset.currentIndex(), -1);
-  // Each of 40 pixels raises the centre by a four-hundredth of the width: 180 HU.
-  EXPECT_NEAR(grey(), 255.0 * ((40.0 - 579.5) / 1799.0 + 0.5), 1.5);
+  // Each of 40 pixels raises the level by a two hundredth of the width: 400 HU.
+  EXPECT_NEAR(grey(), 255.0 * ((40.0 - 900.0) / 2000.0 + 0.5), 1.5);
   preset.setCurrentIndex(1);
   emit preset.activated(1);
   // Of soft tissue, 40 +- 200, it is the centre.
