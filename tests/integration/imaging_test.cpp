@@ -347,5 +347,20 @@ TEST_F(ImagingTest, AWindowThatIsClosedLeavesNoScanBehind) {
   EXPECT_FALSE(has_scratch());
 }
 
+TEST_F(ImagingTest, AWindowThatIsClosedWhileItMakesABoneLeavesNoEditList) {
+  const auto lists = [] {
+    auto names = test::names_in(cases_folder());
+    std::erase_if(names, [](const std::string& name) { return !name.ends_with(".edits.yaml"); });
+    return names;
+  };
+  open_scan(series("ct", two_balls()), 2);
+  islands().item(0)->setCheckState(Qt::Checked);
+  const auto before = lists();
+  click("make_bone");
+  EXPECT_EQ(lists().size(), before.size() + 1);
+  window_.reset();
+  EXPECT_EQ(lists(), before);
+}
+
 }  // namespace
 }  // namespace osteon
