@@ -248,6 +248,19 @@ TEST_F(ImagingTest, EverythingCanBeUndoneAndDoneAgain) {
   EXPECT_TRUE(part<QPushButton>("make_bone").isEnabled());
 }
 
+// One ball is softer than the threshold that is taken back, so that one has another number of parts.
+TEST_F(ImagingTest, AThresholdThatIsUndoneWhileItsPartsAreFoundHasNone) {
+  imaging::HuVolume softer = two_balls();
+  for (std::size_t i = 0; i < softer.values.size(); ++i)
+    if (softer.values[i] == test::kBall_hu && i % 60 < 30) softer.values[i] = 600;
+  open_scan(series("softer", softer), 2);
+  part<QSpinBox>("threshold").setValue(700);
+  ASSERT_TRUE(until([&] { return !idle(); }));
+  click("undo_edit");
+  EXPECT_TRUE(until([&] { return found(2) && islands().isEnabled(); })) << words();
+  EXPECT_EQ(part<QSpinBox>("threshold").value(), 226);
+}
+
 TEST_F(ImagingTest, WhatIsNoCtIsRefusedWithOneSentence) {
   const fs::path empty = desk_->temp() / "empty";
   fs::create_directories(empty);

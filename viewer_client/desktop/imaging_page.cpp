@@ -286,16 +286,17 @@ void ImagingPage::find_islands() {
     return steps_.cancel();
   }
   show_work(tr("Finding the parts of bone"));
-  steps_.find(scene_.scan.geometry, history_.now().threshold_hu);
+  searched_hu_ = history_.now().threshold_hu;
+  steps_.find(scene_.scan.geometry, searched_hu_);
 }
 
 void ImagingPage::show_islands(std::vector<ListedIsland> list, IslandMap map) {
   islands_ = std::move(list);
   scene_.islands = std::move(map);
-  found_hu_ = history_.now().threshold_hu;
-  if (!threshold_timer_.isActive()) scene_.look.threshold_hu.reset();
+  found_hu_ = searched_hu_;
   end_work(tr("Double-click a bone, or tick it in the list, and make it."));
-  follow_edits();
+  // A threshold that the user sets just now stays, and its parts are found next.
+  threshold_timer_.isActive() ? refresh_list() : follow_edits();
 }
 
 void ImagingPage::look_at(const std::array<int, 3>& voxel) {

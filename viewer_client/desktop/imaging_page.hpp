@@ -81,7 +81,8 @@ class ImagingPage : public QWidget {
   ImagingScene scene_;
   EditHistory history_;
   std::vector<ListedIsland> islands_;
-  double found_hu_ = 0.0;  // the threshold of the islands
+  double found_hu_ = 0.0;     // the threshold of the islands
+  double searched_hu_ = 0.0;  // that of the islands that are being found
   ImagingSteps steps_;
   QString wanted_source_;       // to open when the step at work has ended
   bool wants_islands_ = false;  // the same
