@@ -246,6 +246,14 @@ TEST_F(ImagingTest, EverythingCanBeUndoneAndDoneAgain) {
   click("undo_edit");
   EXPECT_TRUE(until([&] { return found(2) && ticks() == std::vector<bool>({false, true}); })) << words();
   EXPECT_TRUE(part<QPushButton>("make_bone").isEnabled());
+  // No bone is made of a threshold that the page shows no more.
+  part<QSpinBox>("threshold").setValue(300);
+  EXPECT_FALSE(part<QPushButton>("make_bone").isEnabled());
+  click("undo_edit");
+  EXPECT_EQ(part<QSpinBox>("threshold").value(), 226);
+  EXPECT_EQ(ticks(), (std::vector<bool>{false, true}));
+  EXPECT_TRUE(part<QPushButton>("make_bone").isEnabled());
+  EXPECT_TRUE(part<QPushButton>("redo_edit").isEnabled());
 }
 
 // One ball is softer than the threshold that is taken back, so that one has another number of parts.

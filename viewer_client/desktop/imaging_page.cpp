@@ -190,6 +190,7 @@ QBoxLayout* ImagingPage::make_side() {
                      tr("Puts a seed there, from which the bone grows. Two seeds in one part separate it."),
                      [this] { keep_at(scene_.crosshair); });
   undo_ = add_button(*column, tr("&Undo the edit"), "undo_edit", tr("Takes the last edit back"), [this] {
+    take_threshold();
     history_.undo();
     follow_edits();
   });
@@ -329,12 +330,17 @@ void ImagingPage::preview_threshold(int hu) {
   scene_.look.threshold_hu = hu;
   threshold_timer_.start();
   refresh_planes();
+  enable_parts();
 }
 
-void ImagingPage::apply_threshold() {
+void ImagingPage::take_threshold() {
   ImagingEdits edits = history_.now();
   edits.threshold_hu = threshold_->value();
   history_.apply(std::move(edits));
+}
+
+void ImagingPage::apply_threshold() {
+  take_threshold();
   follow_edits();
 }
 
@@ -346,7 +352,7 @@ bool ImagingPage::kept(int island) const {
 }
 
 void ImagingPage::keep_at(const std::array<int, 3>& voxel) {
-  if (steps_.busy()) return;
+  if (!keep_->isEnabled()) return;
   const int island = scene_.islands.number(voxel);
   const auto seed = island == 0 ? std::optional<std::array<int, 3>>()
                                 : scene_.islands.seed_near(scene_.scan, island, found_hu_, voxel);
@@ -420,14 +426,17 @@ void ImagingPage::refresh_planes() {
 
 void ImagingPage::enable_parts() {
   const bool free = !steps_.busy(), making = steps_.making();
-  const bool found = free && scene_.open() && !islands_.empty() && history_.now().threshold_hu == found_hu_;
+  // Until the user has stopped to change the threshold, the parts are of another one than the page shows.
+  const bool changing = threshold_timer_.isActive();
+  const bool found =
+      free && !changing && scene_.open() && !islands_.empty() && history_.now().threshold_hu == found_hu_;
   const QString wait = tr("osteon-import is at work. Wait for it, or cancel it.");
   const QString none = free ? tr("Choose a threshold that bone reaches.") : wait;
   set_enabled(*back_, !making, wait);
   set_enabled(*threshold_, !making, wait);
   set_enabled(*keep_, found, none);
   set_enabled(*island_list_, found, none);
-  set_enabled(*undo_, !making && history_.can_undo(), making ? wait : tr("There is nothing to undo."));
+  set_enabled(*undo_, !making && (changing || history_.can_undo()), making ? wait : tr("There is nothing to undo."));
   set_enabled(*redo_, !making && history_.can_redo(), making ? wait : tr("There is nothing to redo."));
   const bool some = !history_.now().seeds_mm.empty();
   set_enabled(*make_, found && some, found ? tr("Keep a bone first: double-click it, or tick it in the list.") : none);

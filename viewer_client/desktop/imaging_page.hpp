@@ -66,6 +66,8 @@ class ImagingPage : public QWidget {
   void point_at(const std::array<int, 3>& voxel);
   void change_window(const HuWindow& window);
   void preview_threshold(int hu);
+  // Into the history.
+  void take_threshold();
   void apply_threshold();
   // A seed at the voxel, or near to it in its island.
   void keep_at(const std::array<int, 3>& voxel);
