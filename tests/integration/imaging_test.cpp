@@ -254,6 +254,11 @@ TEST_F(ImagingTest, EverythingCanBeUndoneAndDoneAgain) {
   EXPECT_EQ(ticks(), (std::vector<bool>{false, true}));
   EXPECT_TRUE(part<QPushButton>("make_bone").isEnabled());
   EXPECT_TRUE(part<QPushButton>("redo_edit").isEnabled());
+  // Nothing of it stays when another scan is opened.
+  part<QSpinBox>("threshold").setValue(300);
+  window_->process_images("/nowhere");
+  EXPECT_EQ(part<QSpinBox>("threshold").value(), 226);
+  EXPECT_EQ(islands().count(), 0);
 }
 
 // One ball is softer than the threshold that is taken back, so that one has another number of parts.

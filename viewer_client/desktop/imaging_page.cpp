@@ -230,6 +230,11 @@ void ImagingPage::open_source(const QString& source) {
   series_list_->clear();
   history_ = {};
   found_hu_ = 0.0;
+  scene_.look = {};
+  island_list_->clear();
+  readout_->clear();
+  const QSignalBlocker quiet(threshold_);
+  threshold_->setValue(static_cast<int>(history_.now().threshold_hu));
   stack_->setCurrentIndex(kNothingOpen);
   show_work(tr("Searching %1").arg(source));
   steps_.open(source);
