@@ -111,7 +111,7 @@ QPushButton* ImagingPage::add_button(QBoxLayout& to, const QString& words, const
 
 QBoxLayout* ImagingPage::make_head() {
   auto* row = new QHBoxLayout;
-  add_button(*row, tr("Open a &folder…"), "imaging_folder", tr("The folder of a CT, or a CD"),
+  add_button(*row, tr("Open a fol&der…"), "imaging_folder", tr("The folder of a CT, or a CD"),
              [this] { choose_folder(); });
   add_button(*row, tr("Open a f&ile…"), "imaging_file", tr("A zip or ISO image, a NIfTI, NRRD or MetaImage file"),
              [this] { choose_file(); });
