@@ -190,6 +190,11 @@ TEST_F(ImagingTest, ThePlanesHangTogether) {
                     Qt::NoScrollPhase, false);
   QApplication::sendEvent(&coronal, &wheel);
   EXPECT_EQ(coronal.slice(), 31);
+  // A touchpad sends parts of a notch.
+  QWheelEvent third(QPointF(40, 40), coronal.mapToGlobal(QPoint(40, 40)), {}, {0, 40}, Qt::NoButton, {},
+                    Qt::NoScrollPhase, false);
+  for (int i = 0; i < 3; ++i) QApplication::sendEvent(&coronal, &third);
+  EXPECT_EQ(coronal.slice(), 32);
   part<QSlider>("slice_axial").setValue(3);
   EXPECT_EQ(axial.slice(), 3);
   QTest::keyClick(&axial, Qt::Key_PageUp);
