@@ -443,13 +443,18 @@ void ImagingPage::enable_parts() {
   set_enabled(*island_list_, found, none);
   set_enabled(*undo_, !making && (changing || history_.can_undo()), making ? wait : tr("There is nothing to undo."));
   set_enabled(*redo_, !making && history_.can_redo(), making ? wait : tr("There is nothing to redo."));
-  const bool some = !history_.now().seeds_mm.empty();
+  const bool some = std::ranges::any_of(history_.now().seeds_mm, [&](const Vec3& seed) {
+    const auto voxel = scene_.open() ? voxel_of(scene_.scan.geometry, seed) : std::nullopt;
+    return voxel && scene_.islands.number(*voxel) != 0;
+  });
   set_enabled(*make_, found && some, found ? tr("Keep a bone first: double-click it, or tick it in the list.") : none);
 }
 
 void ImagingPage::make_bone() {
   show_work(tr("The bone is being made"));
-  steps_.make(history_.now());
+  ImagingEdits edits = history_.now();
+  edits.seeds_mm = scene_.islands.moved_seeds(scene_.scan, found_hu_, edits.seeds_mm);
+  steps_.make(edits);
   events_.busy(steps_.making());
   enable_parts();
 }
