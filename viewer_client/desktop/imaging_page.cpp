@@ -118,6 +118,7 @@ QBoxLayout* ImagingPage::make_head() {
   words_ = new QLabel;
   words_->setObjectName("imaging_words");
   words_->setWordWrap(true);
+  words_->setTextFormat(Qt::PlainText);  // names of files are no HTML
   row->addWidget(words_, 1);
   progress_ = new QProgressBar;
   progress_->setAccessibleName(tr("Progress"));
