@@ -360,6 +360,7 @@ Result<SeriesReport> list_dicom_series(const fs::path& input, const KeepGoing& k
 Result<SeriesReport> draw_dicom_series(const fs::path& input, const fs::path& folder, const KeepGoing& keep_going) {
   auto found = survey(input, keep_going);
   if (!found) return tl::unexpected(found.error());
+  if (const auto chosen = choose(*found, {}); !chosen) return tl::unexpected(chosen.error());
   auto written = write_new_folder(
       folder, [&](const fs::path& partial) { return draw_all(*found, partial, part(keep_going, kHeadersEnd, 1.0)); });
   if (!written) return tl::unexpected(written.error());

@@ -194,6 +194,11 @@ TEST_F(ImagingTest, ThePlanesHangTogether) {
                     Qt::NoScrollPhase, false);
   QApplication::sendEvent(&coronal, &wheel);
   EXPECT_EQ(coronal.slice(), 31);
+  // A touchpad sends parts of a notch.
+  QWheelEvent third(QPointF(40, 40), coronal.mapToGlobal(QPoint(40, 40)), {}, {0, 40}, Qt::NoButton, {},
+                    Qt::NoScrollPhase, false);
+  for (int i = 0; i < 3; ++i) QApplication::sendEvent(&coronal, &third);
+  EXPECT_EQ(coronal.slice(), 32);
   part<QSlider>("slice_axial").setValue(3);
   EXPECT_EQ(axial.slice(), 3);
   QTest::keyClick(&axial, Qt::Key_PageUp);
@@ -210,15 +215,15 @@ TEST_F(ImagingTest, TheRightButtonDragsTheWindowAndPresetsBringItBack) {
   // Between two balls and away from crosshair and letters.
   const QPoint muscle = axial.pixel({29, 20, 12}) + QPoint(-3, 0);
   const auto grey = [&] { return qGray(axial.grab().toImage().pixel(muscle)); };
-  // 40 HU in the window 400 +- 900: (40 - 399.5) / 1799 + 0.5 of white.
-  EXPECT_NEAR(grey(), 255.0 * ((40.0 - 399.5) / 1799.0 + 0.5), 1.5);
+  // 40 HU in the window 500 +- 1000.
+  EXPECT_NEAR(grey(), 255.0 * ((40.0 - 500.0) / 2000.0 + 0.5), 1.5);
   QTest::mousePress(&axial, Qt::RightButton, {}, muscle);
   QMouseEvent drag(QEvent::MouseMove, muscle + QPoint(0, 40), Qt::NoButton, Qt::RightButton, {});
   QApplication::sendEvent(&axial, &drag);
   QTest::mouseRelease(&axial, Qt::RightButton, {}, muscle + QPoint(0, 40));
   EXPECT_EQ(preset.currentIndex(), -1);
-  // Each of 40 pixels raises the centre by a four-hundredth of the width: 180 HU.
-  EXPECT_NEAR(grey(), 255.0 * ((40.0 - 579.5) / 1799.0 + 0.5), 1.5);
+  // Each of 40 pixels raises the level by a two hundredth of the width: 400 HU.
+  EXPECT_NEAR(grey(), 255.0 * ((40.0 - 900.0) / 2000.0 + 0.5), 1.5);
   preset.setCurrentIndex(1);
   emit preset.activated(1);
   // Of soft tissue, 40 +- 200, it is the centre.
@@ -251,6 +256,32 @@ TEST_F(ImagingTest, EverythingCanBeUndoneAndDoneAgain) {
   click("undo_edit");
   EXPECT_TRUE(until([&] { return found(2) && ticks() == std::vector<bool>({false, true}); })) << words();
   EXPECT_TRUE(part<QPushButton>("make_bone").isEnabled());
+  // No bone is made of a threshold that the page shows no more.
+  part<QSpinBox>("threshold").setValue(300);
+  EXPECT_FALSE(part<QPushButton>("make_bone").isEnabled());
+  click("undo_edit");
+  EXPECT_EQ(part<QSpinBox>("threshold").value(), 226);
+  EXPECT_EQ(ticks(), (std::vector<bool>{false, true}));
+  EXPECT_TRUE(part<QPushButton>("make_bone").isEnabled());
+  EXPECT_TRUE(part<QPushButton>("redo_edit").isEnabled());
+  // Nothing of it stays when another scan is opened.
+  part<QSpinBox>("threshold").setValue(300);
+  window_->process_images("/nowhere");
+  EXPECT_EQ(part<QSpinBox>("threshold").value(), 226);
+  EXPECT_EQ(islands().count(), 0);
+}
+
+// One ball is softer than the threshold that is taken back, so that one has another number of parts.
+TEST_F(ImagingTest, AThresholdThatIsUndoneWhileItsPartsAreFoundHasNone) {
+  imaging::HuVolume softer = two_balls();
+  for (std::size_t i = 0; i < softer.values.size(); ++i)
+    if (softer.values[i] == test::kBall_hu && i % 60 < 30) softer.values[i] = 600;
+  open_scan(series("softer", softer), 2);
+  part<QSpinBox>("threshold").setValue(700);
+  ASSERT_TRUE(until([&] { return !idle(); }));
+  click("undo_edit");
+  EXPECT_TRUE(until([&] { return found(2) && islands().isEnabled(); })) << words();
+  EXPECT_EQ(part<QSpinBox>("threshold").value(), 226);
 }
 
 TEST_F(ImagingTest, TheLimitsOfTheHistogramAreDragged) {
@@ -379,6 +410,21 @@ TEST_F(ImagingTest, AWindowThatIsClosedLeavesNoScanBehind) {
   EXPECT_TRUE(has_scratch());
   window_.reset();
   EXPECT_FALSE(has_scratch());
+}
+
+TEST_F(ImagingTest, AWindowThatIsClosedWhileItMakesABoneLeavesNoEditList) {
+  const auto lists = [] {
+    auto names = test::names_in(cases_folder());
+    std::erase_if(names, [](const std::string& name) { return !name.ends_with(".edits.yaml"); });
+    return names;
+  };
+  open_scan(series("ct", two_balls()), 2);
+  islands().item(0)->setCheckState(Qt::Checked);
+  const auto before = lists();
+  click("make_bone");
+  EXPECT_EQ(lists().size(), before.size() + 1);
+  window_.reset();
+  EXPECT_EQ(lists(), before);
 }
 
 }  // namespace

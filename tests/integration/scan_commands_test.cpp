@@ -97,6 +97,8 @@ TEST_F(ScanCommands, EachSeriesHasAPicture) {
   EXPECT_EQ(names_in(folder_ / "pictures"), std::set<std::string>{"series-1.png"});
   EXPECT_EQ(content(folder_ / "pictures" / "series-1.png").substr(1, 3), "PNG");
   refused({"series", path("ct"), "--pictures", path("pictures")}, "pictures");
+  fs::create_directory(folder_ / "empty");
+  refused({"series", path("empty"), "--pictures", path("none")}, "empty");
 }
 
 }  // namespace

@@ -111,13 +111,14 @@ QPushButton* ImagingPage::add_button(QBoxLayout& to, const QString& words, const
 
 QBoxLayout* ImagingPage::make_head() {
   auto* row = new QHBoxLayout;
-  add_button(*row, tr("Open a &folder…"), "imaging_folder", tr("The folder of a CT, or a CD"),
+  add_button(*row, tr("Open a fol&der…"), "imaging_folder", tr("The folder of a CT, or a CD"),
              [this] { choose_folder(); });
   add_button(*row, tr("Open a f&ile…"), "imaging_file", tr("A zip or ISO image, a NIfTI, NRRD or MetaImage file"),
              [this] { choose_file(); });
   words_ = new QLabel;
   words_->setObjectName("imaging_words");
   words_->setWordWrap(true);
+  words_->setTextFormat(Qt::PlainText);  // names of files are no HTML
   row->addWidget(words_, 1);
   progress_ = new QProgressBar;
   progress_->setAccessibleName(tr("Progress"));
@@ -193,8 +194,8 @@ QBoxLayout* ImagingPage::make_side() {
                      tr("Puts a seed there, from which the bone grows. Two seeds in one part separate it."),
                      [this] { keep_at(scene_.crosshair); });
   undo_ = add_button(*column, tr("&Undo the edit"), "undo_edit", tr("Takes the last edit back"), [this] {
-    // A threshold that is still being changed is no edit yet.
-    if (!threshold_timer_.isActive()) history_.undo();
+    take_threshold();
+    history_.undo();
     follow_edits();
   });
   undo_->setShortcut(QKeySequence::Undo);
@@ -233,6 +234,11 @@ void ImagingPage::open_source(const QString& source) {
   series_list_->clear();
   history_ = {};
   found_hu_.reset();
+  scene_.look = {};
+  island_list_->clear();
+  readout_->clear();
+  const QSignalBlocker quiet(threshold_);
+  threshold_->setValue(static_cast<int>(history_.now().threshold_hu));
   stack_->setCurrentIndex(kNothingOpen);
   show_work(tr("Searching %1").arg(source));
   steps_.open(source);
@@ -291,18 +297,19 @@ void ImagingPage::find_islands() {
     return steps_.cancel();
   }
   show_work(tr("Finding the parts of bone"));
-  steps_.find(scene_.scan.geometry, history_.now().threshold_hu);
+  searched_hu_ = history_.now().threshold_hu;
+  steps_.find(scene_.scan.geometry, searched_hu_);
 }
 
 void ImagingPage::show_islands(std::vector<ListedIsland> list, IslandMap map) {
   islands_ = std::move(list);
   scene_.islands = std::move(map);
   const bool first = !found_hu_;
-  found_hu_ = history_.now().threshold_hu;
+  found_hu_ = searched_hu_;
   if (first) show_largest_bone();
   end_work(tr("Double-click a bone, or tick it in the list, and make it."));
-  if (threshold_timer_.isActive()) return refresh_list();  // the user chooses another threshold meanwhile
-  follow_edits();
+  // A threshold that the user sets just now stays, and its parts are found next.
+  threshold_timer_.isActive() ? refresh_list() : follow_edits();
 }
 
 void ImagingPage::show_largest_bone() {
@@ -348,10 +355,14 @@ void ImagingPage::preview_threshold(int hu) {
   enable_parts();
 }
 
-void ImagingPage::apply_threshold() {
+void ImagingPage::take_threshold() {
   ImagingEdits edits = history_.now();
   edits.threshold_hu = threshold_->value();
   history_.apply(std::move(edits));
+}
+
+void ImagingPage::apply_threshold() {
+  take_threshold();
   follow_edits();
 }
 
@@ -437,9 +448,11 @@ void ImagingPage::refresh_planes() {
 }
 
 void ImagingPage::enable_parts() {
-  const bool changing = threshold_timer_.isActive(), making = steps_.making();
-  const bool free = !steps_.busy() && !changing;
-  const bool found = free && scene_.open() && !islands_.empty() && history_.now().threshold_hu == found_hu_;
+  const bool free = !steps_.busy(), making = steps_.making();
+  // Until the user has stopped to change the threshold, the parts are of another one than the page shows.
+  const bool changing = threshold_timer_.isActive();
+  const bool found =
+      free && !changing && scene_.open() && !islands_.empty() && history_.now().threshold_hu == found_hu_;
   const QString wait = tr("osteon-import is at work. Wait for it, or cancel it.");
   const QString none = free ? tr("Choose a threshold that bone reaches.") : wait;
   set_enabled(*back_, !making, wait);
@@ -448,13 +461,18 @@ void ImagingPage::enable_parts() {
   set_enabled(*island_list_, found, none);
   set_enabled(*undo_, !making && (changing || history_.can_undo()), making ? wait : tr("There is nothing to undo."));
   set_enabled(*redo_, !making && history_.can_redo(), making ? wait : tr("There is nothing to redo."));
-  const bool some = !history_.now().seeds_mm.empty();
+  const bool some = std::ranges::any_of(history_.now().seeds_mm, [&](const Vec3& seed) {
+    const auto voxel = scene_.open() ? voxel_of(scene_.scan.geometry, seed) : std::nullopt;
+    return voxel && scene_.islands.number(*voxel) != 0;
+  });
   set_enabled(*make_, found && some, found ? tr("Keep a bone first: double-click it, or tick it in the list.") : none);
 }
 
 void ImagingPage::make_bone() {
   show_work(tr("The bone is being made"));
-  steps_.make(history_.now());
+  ImagingEdits edits = history_.now();
+  edits.seeds_mm = scene_.islands.moved_seeds(scene_.scan, found_hu_, edits.seeds_mm);
+  steps_.make(edits);
   events_.busy(steps_.making());
   enable_parts();
 }

@@ -69,6 +69,8 @@ class ImagingPage : public QWidget {
   void point_at(const std::array<int, 3>& voxel);
   void change_window(const HuWindow& window);
   void preview_threshold(int hu);
+  // Into the history.
+  void take_threshold();
   void apply_threshold();
   // A seed at the voxel, or near to it in its island.
   void keep_at(const std::array<int, 3>& voxel);
@@ -85,6 +87,7 @@ class ImagingPage : public QWidget {
   EditHistory history_;
   std::vector<ListedIsland> islands_;
   std::optional<double> found_hu_;  // the threshold of the islands; nothing: none were found yet
+  double searched_hu_ = 0.0;        // that of the islands that are being found
   ImagingSteps steps_;
   QString wanted_source_;       // to open when the step at work has ended
   bool wants_islands_ = false;  // the same

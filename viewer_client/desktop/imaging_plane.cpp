@@ -141,7 +141,9 @@ void ImagingPlane::mouseDoubleClickEvent(QMouseEvent* event) {
 }
 
 void ImagingPlane::wheelEvent(QWheelEvent* event) {
-  const int notches = event->angleDelta().y() / kWheelStep;
+  turned_ += event->angleDelta().y();  // of a touchpad: a little at a time
+  const int notches = turned_ / kWheelStep;
+  turned_ %= kWheelStep;
   if (scene_.open() && notches != 0) move_by(0, 0, notches);
   event->accept();
 }

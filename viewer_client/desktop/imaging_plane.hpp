@@ -68,6 +68,7 @@ class ImagingPlane : public QWidget {
   QSlider* slider_;
   std::vector<std::uint32_t> pixels_;
   int drawn_slice_ = -1;  // -1: the picture is stale
+  int turned_ = 0;        // of the wheel, less than a notch
   QPoint dragged_from_;
 };
 

@@ -27,6 +27,8 @@ bool has_one_scan(const QString& source) {
   return false;
 }
 
+std::filesystem::path edits_of(const std::filesystem::path& bone) { return bone.string() + ".edits.yaml"; }
+
 QString number_text(double value) { return QLocale().toString(value, 'g', 3); }
 
 ListedSeries listed_series(const QJsonObject& of, int taken, const QString& pictures) {
@@ -73,8 +75,10 @@ ImagingSteps::ImagingSteps(Events events)
 ImagingSteps::~ImagingSteps() {
   if (loader_) loader_->wait();
   run_.reset();
+  const bool unfinished = maker_ != nullptr;
   maker_.reset();
   std::error_code ignored;
+  if (unfinished && !is_case(out_)) std::filesystem::remove(edits_of(out_), ignored);
   std::filesystem::remove_all(scratch_, ignored);
 }
 
@@ -184,15 +188,15 @@ void ImagingSteps::read_islands(const QString& said, const ScanGeometry& scan) {
 
 void ImagingSteps::make(const ImagingEdits& edits) {
   cancelled_ = false;
-  const std::filesystem::path out = new_case_folder(source_);
-  const QString file = text_of(out) + ".edits.yaml";
+  out_ = new_case_folder(source_);
+  const QString file = text_of(edits_of(out_));
   const QByteArray text = QByteArray::fromStdString(edit_list_text(edits));
   QSaveFile saved(file);
   if (!saved.open(QIODevice::WriteOnly) || saved.write(text) != text.size() || !saved.commit())
     return fail(tr("Cannot write %1. Is the disk full?").arg(file));
   QStringList how{"ct", source_, "--threshold", QString::number(edits.threshold_hu, 'g', 17), "--edits", file};
   if (series_) how << "--series" << QString::number(*series_);
-  maker_ = std::make_unique<CaseMaker>(how, out,
+  maker_ = std::make_unique<CaseMaker>(how, out_,
                                        CaseMaker::Events{[this](int percent) { events_.progress(percent); },
                                                          [this](const std::filesystem::path& bone) {
                                                            maker_.release()->deleteLater();

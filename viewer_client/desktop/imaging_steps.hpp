@@ -71,6 +71,7 @@ class ImagingSteps : public QObject {
   std::filesystem::path scratch_;
   QString source_;
   std::optional<int> series_;
+  std::filesystem::path out_;  // the case that is made
   bool cancelled_ = false;
   std::unique_ptr<ImporterRun> run_;
   std::unique_ptr<CaseMaker> maker_;

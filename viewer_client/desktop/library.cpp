@@ -54,8 +54,11 @@ std::filesystem::path new_case_folder(const QString& source) {
   QString name = QFileInfo(source).completeBaseName();
   if (name.isEmpty() || is_name_of_unpacked(name.toStdString())) name = "case";
   std::filesystem::path out = cases_folder() / name.toStdString();
-  for (int n = 2; std::filesystem::exists(out); ++n)
-    out = cases_folder() / (name.toStdString() + "-" + std::to_string(n));
+  // The edit list of a case that somebody removed may be all that is left of it.
+  const auto is_taken = [](const std::filesystem::path& bone) {
+    return std::filesystem::exists(bone) || std::filesystem::exists(bone.string() + ".edits.yaml");
+  };
+  for (int n = 2; is_taken(out); ++n) out = cases_folder() / (name.toStdString() + "-" + std::to_string(n));
   return out;
 }
 

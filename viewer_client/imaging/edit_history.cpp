@@ -1,10 +1,20 @@
 #include "viewer_client/imaging/edit_history.hpp"
 
 #include <array>
-#include <cstdio>
+#include <charconv>
 #include <utility>
 
 namespace osteon {
+
+namespace {
+
+// All digits that bring it back, with a point in every locale.
+std::string digits_of(double value) {
+  std::array<char, 32> digits{};
+  return {digits.data(), std::to_chars(digits.data(), digits.data() + digits.size(), value).ptr};
+}
+
+}  // namespace
 
 void EditHistory::apply(ImagingEdits edits) {
   if (edits == now()) return;
@@ -22,15 +32,10 @@ void EditHistory::redo() {
 }
 
 std::string edit_list_text(const ImagingEdits& edits) {
-  std::array<char, 160> line{};
-  std::snprintf(line.data(), line.size(), "# osteon-import ct --threshold %.17g --edits THIS_FILE\nedits:\n",
-                edits.threshold_hu);
-  std::string text = line.data();
-  for (const Vec3& seed : edits.seeds_mm) {
-    std::snprintf(line.data(), line.size(), "  - {kind: seed, point_mm: [%.17g, %.17g, %.17g]}\n", seed.x(), seed.y(),
-                  seed.z());
-    text += line.data();
-  }
+  std::string text = "# osteon-import ct --threshold " + digits_of(edits.threshold_hu) + " --edits THIS_FILE\nedits:\n";
+  for (const Vec3& seed : edits.seeds_mm)
+    text += "  - {kind: seed, point_mm: [" + digits_of(seed.x()) + ", " + digits_of(seed.y()) + ", " +
+            digits_of(seed.z()) + "]}\n";
   return text;
 }
 

@@ -1,5 +1,6 @@
 #include "viewer_client/imaging/island_map.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -66,6 +67,21 @@ std::optional<std::array<int, 3>> IslandMap::seed_near(const ShownScan& scan, in
         nearest = at;
       }
   return nearest;
+}
+
+std::vector<Vec3> IslandMap::moved_seeds(const ShownScan& scan, double threshold_hu,
+                                         std::span<const Vec3> seeds_mm) const {
+  std::vector<Vec3> moved;
+  for (const Vec3& seed : seeds_mm) {
+    auto voxel = voxel_of(scan.geometry, seed);
+    const int island = voxel ? number(*voxel) : 0;
+    if (island == 0) continue;
+    if (scan.at(*voxel) < threshold_hu) voxel = seed_near(scan, island, threshold_hu, *voxel);
+    if (!voxel) continue;
+    const Vec3 at_mm = centre_of(scan.geometry, *voxel);
+    if (std::ranges::find(moved, at_mm) == moved.end()) moved.push_back(at_mm);
+  }
+  return moved;
 }
 
 }  // namespace osteon

@@ -3,6 +3,7 @@
 #include <array>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -35,6 +36,10 @@ class IslandMap {
   // such voxels only. Nothing: the island has none.
   [[nodiscard]] std::optional<std::array<int, 3>> seed_near(const ShownScan& scan, int island, double threshold_hu,
                                                             const std::array<int, 3>& voxel) const;
+  // Seeds that were put at another threshold, as they are at this one: what lies below it moves within its island, and
+  // what lies in no island goes.
+  [[nodiscard]] std::vector<Vec3> moved_seeds(const ShownScan& scan, double threshold_hu,
+                                              std::span<const Vec3> seeds_mm) const;
 
  private:
   std::array<int, 3> first_{};  // of the part, in the scan

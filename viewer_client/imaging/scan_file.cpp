@@ -1,12 +1,14 @@
 #include "viewer_client/imaging/scan_file.hpp"
 
-#include <array>
-#include <cmath>
-#include <cstdio>
+#include <algorithm>
 #include <fstream>
 #include <map>
 #include <new>
+#include <sstream>
 #include <string>
+#include <system_error>
+
+#include "common/core/read_number.hpp"
 
 namespace osteon {
 
@@ -28,27 +30,41 @@ Header read_header(std::istream& in) {
   return fields;
 }
 
-bool read_geometry(const Header& header, ScanGeometry& to) {
-  const auto field = [&](const char* name) {
-    const auto found = header.find(name);
-    return found == header.end() ? std::string() : found->second;
-  };
-  std::array<double, 9> a{};
-  Vec3& o = to.origin_mm;
-  if (field("encoding") != "raw" || field("endian") != "little" || field("space") != "left-posterior-superior")
-    return false;
-  if (std::sscanf(field("sizes").c_str(), "%d %d %d", &to.dims[0], &to.dims[1], &to.dims[2]) != 3) return false;
-  if (std::sscanf(field("space directions").c_str(), "(%lf,%lf,%lf) (%lf,%lf,%lf) (%lf,%lf,%lf)", &a[0], &a[1], &a[2],
-                  &a[3], &a[4], &a[5], &a[6], &a[7], &a[8]) != 9)
-    return false;
-  if (std::sscanf(field("space origin").c_str(), "(%lf,%lf,%lf)", &o.x(), &o.y(), &o.z()) != 3) return false;
-  for (int axis = 0; axis < 3; ++axis) {
-    const auto first = static_cast<std::size_t>(3 * axis);
-    to.axes_mm.col(axis) = Vec3(a[first], a[first + 1], a[first + 2]);
-    const int dim = to.dims[static_cast<std::size_t>(axis)];
-    if (dim < 1 || dim > kMostAxis || !(to.axes_mm.col(axis).norm() > 0.0)) return false;
+// The numbers of a field without its brackets and commas, the same in every locale. Empty: a word is no number.
+template <class Number>
+std::vector<Number> numbers_of(const Header& header, const char* name) {
+  const auto found = header.find(name);
+  if (found == header.end()) return {};
+  std::string text = found->second;
+  std::ranges::replace_if(
+      text, [](char c) { return c == '(' || c == ',' || c == ')'; }, ' ');
+  std::vector<Number> numbers;
+  std::istringstream words(text);
+  for (std::string word; words >> word;) {
+    const auto number = read_number<Number>(word);
+    if (!number) return {};
+    numbers.push_back(*number);
   }
-  return to.axes_mm.allFinite() && o.allFinite();
+  return numbers;
+}
+
+bool read_geometry(const Header& header, ScanGeometry& to) {
+  const auto is = [&](const char* name, const char* value) {
+    const auto found = header.find(name);
+    return found != header.end() && found->second == value;
+  };
+  if (!is("encoding", "raw") || !is("endian", "little") || !is("space", "left-posterior-superior")) return false;
+  const auto dims = numbers_of<int>(header, "sizes");
+  const auto axes = numbers_of<double>(header, "space directions"), origin = numbers_of<double>(header, "space origin");
+  if (dims.size() != 3 || axes.size() != 9 || origin.size() != 3) return false;
+  to.origin_mm = Vec3(origin[0], origin[1], origin[2]);
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto a = static_cast<std::size_t>(axis);
+    to.dims[a] = dims[a];
+    to.axes_mm.col(axis) = Vec3(axes[3 * a], axes[3 * a + 1], axes[3 * a + 2]);
+    if (dims[a] < 1 || dims[a] > kMostAxis || !(to.axes_mm.col(axis).norm() > 0.0)) return false;
+  }
+  return to.axes_mm.allFinite() && to.origin_mm.allFinite();
 }
 
 template <class Value>
@@ -60,10 +76,15 @@ Result<VoxelFile<Value>> read_voxels(const std::filesystem::path& file, const ch
   const auto written = header.find("type");
   if (written == header.end() || written->second != type || !read_geometry(header, read.geometry))
     return bad_input(file.string() + " is no scan of osteon-import; open the CT again");
+  const Error short_file{ErrorCode::invalid_input, file.string() + " ends early; is the disk full?"};
+  std::error_code error;
+  // Before a header claims memory that nothing fills.
+  if (read.geometry.count() > std::filesystem::file_size(file, error) / sizeof(Value))
+    return tl::unexpected(short_file);
   read.values.resize(read.geometry.count());
   const auto bytes = static_cast<std::streamsize>(read.values.size() * sizeof(Value));
   in.read(reinterpret_cast<char*>(read.values.data()), bytes);
-  if (in.gcount() != bytes) return bad_input(file.string() + " ends early; is the disk full?");
+  if (in.gcount() != bytes) return tl::unexpected(short_file);
   return read;
 } catch (const std::bad_alloc&) {
   return failure(ErrorCode::exhausted, "this machine has no memory for the scan in " + file.string());

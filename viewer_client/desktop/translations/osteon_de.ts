@@ -618,7 +618,7 @@
         <translation>Abgebrochen. Nichts wurde gespeichert.</translation>
     </message>
     <message>
-        <source>Open a &amp;folder…</source>
+        <source>Open a fol&amp;der…</source>
         <translation>&amp;Ordner öffnen…</translation>
     </message>
     <message>
@@ -627,7 +627,7 @@
     </message>
     <message>
         <source>Open a f&amp;ile…</source>
-        <translation>&amp;Datei öffnen…</translation>
+        <translation>Datei ö&amp;ffnen…</translation>
     </message>
     <message>
         <source>A zip or ISO image, a NIfTI, NRRD or MetaImage file</source>

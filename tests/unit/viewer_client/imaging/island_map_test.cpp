@@ -74,6 +74,25 @@ TEST(IslandMap, GivesTheNearestSeedAboveTheThreshold) {
   EXPECT_FALSE(map->seed_near(scan, 3, 200.0, {3, 3, 3}));
 }
 
+// What a person has ticked at a low threshold is still what is made at a high one.
+TEST(IslandMap, MovesSeedsAboveTheThreshold) {
+  ShownScan scan = scan_of(8);
+  auto part = part_of(scan, {2, 2, 2});
+  const auto put = [&](const Voxel& at, std::int16_t hu, std::uint8_t island) {
+    scan.values[scan.index(at)] = hu;
+    part.values[part.index({at[0] - 2, at[1] - 2, at[2] - 2})] = island;
+  };
+  put({3, 3, 3}, 300, 1);  // marrow at the new threshold
+  put({4, 3, 3}, 900, 1);
+  put({3, 5, 3}, 900, 2);
+  scan.values[scan.index({2, 2, 2})] = 300;  // in no island
+  const auto map = IslandMap::make(scan.geometry, part);
+  ASSERT_TRUE(map);
+  const auto at = [&](const Voxel& voxel) { return centre_of(scan.geometry, voxel); };
+  const std::vector<Vec3> seeds{at({3, 3, 3}), at({3, 5, 3}), at({2, 2, 2}), at({4, 3, 3})};
+  EXPECT_EQ(map->moved_seeds(scan, 500.0, seeds), (std::vector<Vec3>{at({4, 3, 3}), at({3, 5, 3})}));
+}
+
 TEST(IslandMap, FindsTheVoxelOfAPosition) {
   const ScanGeometry scan = scan_of(8).geometry;
   for (const Voxel& voxel : {Voxel{0, 0, 0}, Voxel{7, 3, 1}, Voxel{7, 7, 7}})

@@ -78,6 +78,17 @@ TEST(ScanFile, RefusesWhatIsNoneAndWhatEndsEarly) {
   EXPECT_NE(cut.error().message.find("ends early"), std::string::npos);
 }
 
+// Eight terabytes are named, and none is there.
+TEST(ScanFile, ClaimsNoMemoryThatItDoesNotFill) {
+  const test::TempDir folder;
+  std::ofstream(folder / "scan.nrrd") << "NRRD0004\ntype: int16\ndimension: 3\nspace: left-posterior-superior\n"
+                                         "sizes: 16384 16384 16384\nspace directions: (1,0,0) (0,1,0) (0,0,1)\n"
+                                         "endian: little\nencoding: raw\nspace origin: (0,0,0)\n\nvoxels";
+  const auto read = read_scan_file(folder / "scan.nrrd");
+  ASSERT_FALSE(read);
+  EXPECT_NE(read.error().message.find("ends early"), std::string::npos) << read.error().message;
+}
+
 TEST(ScanFile, IsNotLeftHalfWritten) {
   const test::TempDir folder;
   const imaging::HuVolume volume = oblique();
