@@ -471,7 +471,7 @@ void ImagingPage::enable_parts() {
 void ImagingPage::make_bone() {
   show_work(tr("The bone is being made"));
   ImagingEdits edits = history_.now();
-  edits.seeds_mm = scene_.islands.moved_seeds(scene_.scan, found_hu_, edits.seeds_mm);
+  edits.seeds_mm = scene_.islands.moved_seeds(scene_.scan, found_hu_.value_or(0.0), edits.seeds_mm);
   steps_.make(edits);
   events_.busy(steps_.making());
   enable_parts();
