@@ -87,7 +87,11 @@ TEST_F(ScanCommands, IslandsAreListedAndNumbered) {
     ASSERT_TRUE(voxel);
     EXPECT_EQ(map->number(*voxel), island["number"].get<int>());
   }
-  refused({"islands", path("ct"), path("none.nrrd"), "--threshold", "1001"}, "threshold");
+  // This comes to light after the progress of the reading.
+  const auto none = start({"islands", path("ct"), path("none.nrrd"), "--threshold", "1001"});
+  EXPECT_EQ(none.exit_code, 1);
+  EXPECT_NE(none.err.find("no voxel reaches the bone threshold of 1001 HU"), std::string::npos) << none.err;
+  EXPECT_FALSE(fs::exists(folder_ / "none.nrrd"));
 }
 
 TEST_F(ScanCommands, EachSeriesHasAPicture) {

@@ -99,7 +99,11 @@ void ImagingSteps::cancel() {
   if (maker_) maker_->cancel();
 }
 
-void ImagingSteps::fail(const QString& sentence) { events_.failed(cancelled_ ? QString() : sentence); }
+void ImagingSteps::fail(const QString& sentence) {
+  // The user knows the source, and not its copy.
+  QString shown = sentence;
+  events_.failed(cancelled_ ? QString() : shown.replace(scratch_file(kScanFile), source_));
+}
 
 void ImagingSteps::start(const QStringList& arguments, std::function<void(const QString& said)> done) {
   cancelled_ = false;
