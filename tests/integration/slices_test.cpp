@@ -114,6 +114,52 @@ class SlicesTest : public test::WindowBench {
     return disc;
   }
 
+  void drill_along_the_tool() {
+    // Along the tool, the cross goes with the tip.
+    axes_->setCurrentIndex(1);
+    hold_drill();
+    ASSERT_TRUE(push_until([&] { return cut() && tip().z() < -7.0; })) << problem();
+    EXPECT_TRUE(push_until([&] { return (panel_->point_mm() - tip()).norm() < 0.5; })) << problem();
+    EXPECT_TRUE(until([&] { return !slices_[0]->outline().empty(); })) << "the drill is drawn";
+    keep_picture("slices_drilling");
+    follow_->click();
+    release(middle());
+    ASSERT_TRUE(until([&] { return view_->updater()->states().front().phase != CuttingPhase::cutting; }));
+  }
+  void expect_windows(const SliceView& across) {
+    // A drag of the right button is a window by hand.
+    EXPECT_EQ(panel_->window(), kBoneWindow);
+    const QPoint at = across.mapTo(window_.get(), across.rect().center());
+    QTest::mousePress(frame(), Qt::RightButton, {}, at);
+    QTest::mouseMove(frame(), at + QPoint(10, 20));
+    QTest::mouseRelease(frame(), Qt::RightButton, {}, at + QPoint(10, 20));
+    // 10 HU for each pixel: a two hundredth of 2000.
+    EXPECT_EQ(panel_->window(), (HuWindow{700.0, 2100.0}));
+    EXPECT_EQ(presets_->currentIndex(), 3);
+    const radiology::PixelGrid& plane = across.image()->plane;
+    for (const int column : {0, plane.columns / 2})
+      EXPECT_EQ(qGray(across.grey().pixel(column, plane.rows / 2)),
+                panel_->window().grey(static_cast<double>(across.image()->hu[plane.index(column, plane.rows / 2)])));
+    presets_->setFocus();
+    for (int i = 0; i < 2; ++i) QTest::keyClick(presets_, Qt::Key_Up);
+    EXPECT_EQ(panel_->window(), kSoftTissueWindow);
+  }
+
+  void expect_middle_button_moves(const SliceView& axial) {
+    // The middle button moves the image and leaves the cross.
+    const double pixel_mm = axial.image()->plane.column_mm.norm();
+    const Vec3 cross_mm = panel_->point_mm();
+    const Vec3 corner_mm = axial.image()->plane.first_mm;
+    const QPoint at = axial.mapTo(window_.get(), axial.rect().center());
+    QTest::mousePress(frame(), Qt::MiddleButton, {}, at);
+    QTest::mouseMove(frame(), at + QPoint(20, 0));
+    QTest::mouseRelease(frame(), Qt::MiddleButton, {}, at + QPoint(20, 0));
+    EXPECT_EQ(panel_->point_mm(), cross_mm);
+    EXPECT_TRUE(until([&] {
+      return std::abs(axial.image()->plane.first_mm.x() - (corner_mm.x() - 20.0 * pixel_mm)) < 1e-6;
+    })) << "what was under the pointer is there still";
+  }
+
   SlicesPanel* panel_ = nullptr;
   QComboBox *axes_ = nullptr, *presets_ = nullptr;
   QCheckBox* follow_ = nullptr;
@@ -133,16 +179,8 @@ TEST_F(SlicesTest, ShowTheHoleThatThePersonDrills) {
   EXPECT_NEAR(hu_at(*slices_[1], {middle_mm.x(), middle_mm.y(), -2.5}), kCortex_hu, kRounded_hu);
   keep_picture("slices_whole");
 
-  // Along the tool, the cross goes with the tip.
-  axes_->setCurrentIndex(1);
-  hold_drill();
-  ASSERT_TRUE(push_until([&] { return cut() && tip().z() < -7.0; })) << problem();
-  EXPECT_TRUE(push_until([&] { return (panel_->point_mm() - tip()).norm() < 0.5; })) << problem();
-  EXPECT_TRUE(until([&] { return !slices_[0]->outline().empty(); })) << "the drill is drawn";
-  keep_picture("slices_drilling");
-  follow_->click();
-  release(middle());
-  ASSERT_TRUE(until([&] { return view_->updater()->states().front().phase != CuttingPhase::cutting; }));
+  drill_along_the_tool();
+  if (HasFatalFailure()) return;
 
   // By keys back into the cortex, and nearer.
   SliceView& across = *slices_[2];
@@ -165,22 +203,7 @@ TEST_F(SlicesTest, ShowTheHoleThatThePersonDrills) {
               kRounded_hu);
   keep_picture("slices_across");
 
-  // A drag of the right button is a window by hand.
-  EXPECT_EQ(panel_->window(), kBoneWindow);
-  const QPoint at = across.mapTo(window_.get(), across.rect().center());
-  QTest::mousePress(frame(), Qt::RightButton, {}, at);
-  QTest::mouseMove(frame(), at + QPoint(10, 20));
-  QTest::mouseRelease(frame(), Qt::RightButton, {}, at + QPoint(10, 20));
-  // 10 HU for each pixel: a two hundredth of 2000.
-  EXPECT_EQ(panel_->window(), (HuWindow{700.0, 2100.0}));
-  EXPECT_EQ(presets_->currentIndex(), 3);
-  const radiology::PixelGrid& plane = across.image()->plane;
-  for (const int column : {0, plane.columns / 2})
-    EXPECT_EQ(qGray(across.grey().pixel(column, plane.rows / 2)),
-              panel_->window().grey(static_cast<double>(across.image()->hu[plane.index(column, plane.rows / 2)])));
-  presets_->setFocus();
-  for (int i = 0; i < 2; ++i) QTest::keyClick(presets_, Qt::Key_Up);
-  EXPECT_EQ(panel_->window(), kSoftTissueWindow);
+  expect_windows(across);
 
   // What is undone is in the slices again.
   trigger("put_down");
@@ -236,17 +259,7 @@ TEST_F(SlicesTest, AreLedByMouseWheelAndSliderAndStayLinked) {
   ASSERT_TRUE(until([&] { return axial.image()->plane.column_mm.norm() < 0.9 * pixel_mm && shown(); }));
   for (const SliceView* slice : slices_) EXPECT_NEAR(slice->image()->plane.column_mm.norm(), 0.85 * pixel_mm, 1e-9);
 
-  // The middle button moves the image and leaves the cross.
-  const Vec3 cross_mm = panel_->point_mm();
-  const Vec3 corner_mm = axial.image()->plane.first_mm;
-  const QPoint at = axial.mapTo(window_.get(), axial.rect().center());
-  QTest::mousePress(frame(), Qt::MiddleButton, {}, at);
-  QTest::mouseMove(frame(), at + QPoint(20, 0));
-  QTest::mouseRelease(frame(), Qt::MiddleButton, {}, at + QPoint(20, 0));
-  EXPECT_EQ(panel_->point_mm(), cross_mm);
-  EXPECT_TRUE(until([&] {
-    return std::abs(axial.image()->plane.first_mm.x() - (corner_mm.x() - 20.0 * 0.85 * pixel_mm)) < 1e-6;
-  })) << "what was under the pointer is there still";
+  expect_middle_button_moves(axial);
 
   // The window may have any size, and the whole bone comes back.
   window_->resize(1000, 700);

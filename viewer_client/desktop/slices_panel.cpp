@@ -61,9 +61,10 @@ SlicesPanel::SlicesPanel(InsideLink& inside, QWidget* parent) : QWidget(parent),
   axes_->setCurrentIndex(settings.value("slices/axes", 0).toInt() == 1 ? 1 : 0);
   const HuWindow kept{settings.value("slices/level", kBoneWindow.level_hu).toDouble(),
                       settings.value("slices/width", kBoneWindow.width_hu).toDouble()};
-  const bool numbers = std::isfinite(kept.level_hu) && std::isfinite(kept.width_hu);
   set_axes();
-  set_window(dragged(numbers ? kept : kBoneWindow, 0.0, 0.0));  // within the limits, whatever the file says
+  // Whatever the file says: numbers, within the limits.
+  const bool usable = std::isfinite(kept.level_hu) && std::isfinite(kept.width_hu);
+  set_window(usable ? dragged(kept, 0.0, 0.0) : kBoneWindow);
 }
 
 void SlicesPanel::add_choices(QBoxLayout& all) {

@@ -16,7 +16,7 @@ constexpr double kPitch_mm = 0.5;
 
 std::array<radiology::PixelGrid, kSlices> planes_at(const Vec3& point_mm) {
   LinkedSlices view;
-  view.point_mm = point_mm;
+  view.point_mm = view.centre_mm = point_mm;
   view.pixel_mm = 0.25;
   view.images = {{{40, 30}, {40, 30}, {40, 30}}};
   return planes_of(view);
