@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "tests/support/scenes/bones.hpp"
@@ -174,8 +175,9 @@ TEST_F(CArmPictures, MetalMovesInThePicture) {
   Arm arm({.glare = 0.0});
   const auto without = arm.shoot(bone_, order_at(1, axial()), {.all = true}).back();
   const auto with = arm.shoot(bone_, order_at(2, axial()), {}, metal_at(15.0)).back();
-  // 3.2 mm of steel let 1 in 140 through: black. The bone is far from black.
-  EXPECT_LT(photons_at(*with, 15.0, 0.8), 1.05 * static_cast<double>(with->contrast.black));
+  // 2.8 to 3.2 mm of steel let 1 in 70 to 140 through: one or two of the 84 photons of a pixel. Or it is black, where
+  // the darkest hundredth of the picture is brighter.
+  EXPECT_LT(photons_at(*with, 15.0, 0.8), std::max(4.0, 1.05 * static_cast<double>(with->contrast.black)));
   EXPECT_LT(photons_at(*with, 15.0, 0.8), 0.9 * photons_at(*without, 15.0, 0.8));
   Arm glaring;
   (void)glaring.shoot(bone_, order_at(3, axial()), {.all = true}, metal_at(15.0));
