@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "tests/support/scenes/bones.hpp"
@@ -62,6 +63,16 @@ class CArmPictures : public testing::Test {
     const Pictures both = Arm().shoot(bone_, order, {.all = true}, std::move(metal));
     EXPECT_EQ(both.size(), 2u);
     return both.back();
+  }
+  // The same at its second shot from there: then the whole picture sets the kerma, as after a change, and not the
+  // coarse one.
+  [[nodiscard]] std::shared_ptr<const CArmPicture> second(const ShotOrder& order,
+                                                          const std::vector<PlacedMetal>& metal = {}) {
+    Arm arm;
+    (void)arm.shoot(bone_, order_at(999, order.position), {.all = true}, metal);
+    const Pictures one = arm.shoot(bone_, order, {}, metal);
+    EXPECT_EQ(one.size(), 1u);
+    return one.back();
   }
   // Mean number of photons of a pixel, within a circle on the plate about (x, 0).
   static double photons_at(const CArmPicture& picture, double x_mm, double radius_mm) {
@@ -150,7 +161,7 @@ TEST_F(CArmPictures, AfterCutsIsTheWholePicture) {
   const InsideChange last = bore(14.0);
   const Pictures after = arm.shoot(bone_, order_at(2, axial(0.2)), last);
   ASSERT_EQ(after.size(), 1u);
-  const auto whole = fresh(order_at(2, axial(0.2)));
+  const auto whole = second(order_at(2, axial(0.2)));
   EXPECT_EQ(after[0]->grey, whole->grey);
   EXPECT_EQ(after[0]->shot, whole->shot);
   EXPECT_NE(after[0]->grey, before->grey);
@@ -174,15 +185,16 @@ TEST_F(CArmPictures, MetalMovesInThePicture) {
   Arm arm({.glare = 0.0});
   const auto without = arm.shoot(bone_, order_at(1, axial()), {.all = true}).back();
   const auto with = arm.shoot(bone_, order_at(2, axial()), {}, metal_at(15.0)).back();
-  // 3.2 mm of steel let 1 in 140 through: black. The bone is far from black.
-  EXPECT_LT(photons_at(*with, 15.0, 0.8), 1.05 * static_cast<double>(with->contrast.black));
+  // 2.8 to 3.2 mm of steel let 1 in 70 to 140 through: one or two of the 84 photons of a pixel. Or it is black, where
+  // the darkest hundredth of the picture is brighter.
+  EXPECT_LT(photons_at(*with, 15.0, 0.8), std::max(4.0, 1.05 * static_cast<double>(with->contrast.black)));
   EXPECT_LT(photons_at(*with, 15.0, 0.8), 0.9 * photons_at(*without, 15.0, 0.8));
   Arm glaring;
   (void)glaring.shoot(bone_, order_at(3, axial()), {.all = true}, metal_at(15.0));
   const auto moved = glaring.shoot(bone_, order_at(4, axial()), {}, metal_at(13.0)).back();
-  EXPECT_EQ(moved->grey, fresh(order_at(4, axial()), metal_at(13.0))->grey);
+  EXPECT_EQ(moved->grey, second(order_at(4, axial()), metal_at(13.0))->grey);
   const auto gone = glaring.shoot(bone_, order_at(5, axial())).back();
-  EXPECT_EQ(gone->grey, fresh(order_at(5, axial()))->grey);
+  EXPECT_EQ(gone->grey, second(order_at(5, axial()))->grey);
 }
 
 TEST_F(CArmPictures, AnArmThatMovesOnNeedsNoWholePicture) {
