@@ -43,12 +43,12 @@ class SlicesTest : public test::WindowBench {
     QSettings().setValue("slices/level", "nan");
     QSettings().setValue("slices/width", "inf");
     WindowBench::SetUp();
-    panel_ = window_->findChild<SlicesPanel*>();
-    ASSERT_NE(panel_, nullptr);
     axes_ = window_->findChild<QComboBox*>("slices_axes");
     presets_ = window_->findChild<QComboBox*>("slices_window");
     follow_ = window_->findChild<QCheckBox*>("slices_follow");
     for (std::size_t i = 0; i < kSlices; ++i) slices_[i] = window_->findChild<SliceView*>(QString("slice_%1").arg(i));
+    // It has no meta-object of its own to be found by.
+    panel_ = static_cast<SlicesPanel*>(slices_[0]->parentWidget());
   }
   void TearDown() override {
     // The next window opens as this one was left.
