@@ -64,6 +64,7 @@ GamePad::GamePad() : impl_(std::make_unique<Impl>()) {
 GamePad::~GamePad() {
   impl_->close();
   if (impl_->started) SDL_QuitSubSystem(SDL_INIT_GAMECONTROLLER);
+  SDL_TLSCleanup();  // what SDL keeps for a thread that it did not start
 }
 
 GamePad::Change GamePad::poll() {
