@@ -108,7 +108,7 @@
     </message>
     <message>
         <source>Orbit</source>
-        <translation>Orbit</translation>
+        <translation>Drehung</translation>
     </message>
     <message>
         <source>Tilt</source>
