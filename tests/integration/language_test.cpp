@@ -36,6 +36,7 @@
 
 #include "common/phantoms/phantom_bone.hpp"
 #include "tests/integration/desk.hpp"
+#include "tests/support/wait.hpp"
 #include "viewer_client/desktop/bone_view.hpp"
 #include "viewer_client/desktop/language.hpp"
 #include "viewer_client/desktop/library.hpp"
@@ -227,7 +228,7 @@ class LanguageTest : public testing::Test {
 
   template <class Condition>
   [[nodiscard]] bool until(Condition condition) {
-    const auto deadline = std::chrono::steady_clock::now() + kPatience;
+    const auto deadline = std::chrono::steady_clock::now() + test::stretched(kPatience);
     while (!condition()) {
       if (std::chrono::steady_clock::now() > deadline) return false;
       QTest::qWait(20);

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "tests/integration/desk.hpp"
+#include "tests/support/wait.hpp"
 #include "viewer_client/desktop/bone_view.hpp"
 #include "viewer_client/desktop/main_window.hpp"
 
@@ -36,7 +37,7 @@ class WindowBench : public testing::Test {
   void show();
   template <class Condition>
   [[nodiscard]] static bool until(Condition condition, std::chrono::milliseconds patience = std::chrono::seconds(60)) {
-    const auto deadline = std::chrono::steady_clock::now() + patience;
+    const auto deadline = std::chrono::steady_clock::now() + stretched(patience);
     while (!condition()) {
       if (std::chrono::steady_clock::now() > deadline) return false;
       QTest::qWait(20);

@@ -17,8 +17,10 @@ constexpr std::chrono::milliseconds kShortest{2}, kLongest{20};
 constexpr int kPauses = 50;  // a pause is this part of the time that has passed
 }  // namespace
 
+std::chrono::milliseconds stretched(std::chrono::milliseconds patience) { return kSlower * patience; }
+
 bool wait_until(const std::function<bool()>& condition, std::chrono::milliseconds patience) {
-  const auto began = std::chrono::steady_clock::now(), deadline = began + kSlower * patience;
+  const auto began = std::chrono::steady_clock::now(), deadline = began + stretched(patience);
   while (!condition()) {
     const auto now = std::chrono::steady_clock::now();
     if (now >= deadline) return false;

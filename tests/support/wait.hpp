@@ -8,6 +8,9 @@
 
 namespace osteon::test {
 
+// A patience as the build needs it: five times as long under a sanitizer. The functions below use it by themselves.
+[[nodiscard]] std::chrono::milliseconds stretched(std::chrono::milliseconds patience);
+
 // True as soon as `condition` holds. False if it does not hold within `patience`.
 [[nodiscard]] bool wait_until(const std::function<bool()>& condition, std::chrono::milliseconds patience);
 
