@@ -93,10 +93,11 @@ TEST_F(WindowTest, WheelSpaceAndShiftSetPushSpindleAndFineMotion) {
   EXPECT_TRUE(view_->pointer().input().fine);
   QTest::keyRelease(view_, Qt::Key_Shift);
   EXPECT_FALSE(view_->pointer().input().fine);
-  // The bar says what the mouse does: with an empty hand nothing is pushed.
-  EXPECT_TRUE(window_->statusBar()->currentMessage().startsWith("The left button pushes"));
+  // The bar says what the mouse does: with an empty hand nothing is pushed. Other sentences follow when they must.
   trigger("put_down");
   EXPECT_TRUE(window_->statusBar()->currentMessage().startsWith("Choose a tool"));
+  click_tool("drill");
+  EXPECT_TRUE(window_->statusBar()->currentMessage().startsWith("The left button pushes"));
 }
 
 // The haptic client holds a tool from its start on. As long as the user has none, nobody sees it.
