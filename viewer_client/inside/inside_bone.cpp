@@ -270,12 +270,11 @@ void InsideBone::Impl::say(const HeldBoneStatus& now) {
 
 void InsideBone::Impl::fail(const Error& why) {
   log::warn("the inside of the bone is not shown", {{"reason", why.message}});
-  set_status([&](InsideStatus& now) {
-    now.state = InsideState::failed;
-    now.why = why;
-    painting = nullptr;
-    painted.notify_all();
-  });
+  const MutexLock lock(mutex);
+  status.state = InsideState::failed;
+  status.why = why;
+  painting = nullptr;
+  painted.notify_all();
 }
 
 InsideBone::InsideBone(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
