@@ -122,7 +122,7 @@ void CArmImage::renew(Layers& layers, const std::vector<PlacedMetal>& metal, std
                              layers.photons_of_ugy);
 }
 
-void CArmImage::shoot(const radiology::BoneHu& bone, Request request, const KeepGoing& keep_going) {
+void CArmImage::shoot(const radiology::BoneHu& bone, const Request& request, const KeepGoing& keep_going) {
   const ShotOrder& order = request.order;
   CArmShot shot;
   shot.time_unix_ms = request.time_unix_ms;

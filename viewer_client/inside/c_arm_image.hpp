@@ -63,7 +63,7 @@ class CArmImage final : public InsidePainter {
   };
 
   void note(const InsideChange& change);
-  void shoot(const radiology::BoneHu& bone, Request request, const KeepGoing& keep_going);
+  void shoot(const radiology::BoneHu& bone, const Request& request, const KeepGoing& keep_going);
   void show_projection(const radiology::BoneHu& bone, const CArmPosition& position, const KeepGoing& keep_going);
   // Whether the layers are of this geometry, so that only what changed has to be cast again.
   [[nodiscard]] bool fits(const CArmPosition& position, radiology::Projection projection) const;
