@@ -19,9 +19,7 @@ class AppendedFile {
   explicit AppendedFile(const std::filesystem::path& file)
       : fd_(::open(file.c_str(), O_RDWR | O_APPEND | O_CREAT | O_CLOEXEC | O_NONBLOCK, 0600)) {
     struct stat about {};
-    if (fd_ < 0)
-      reason_ = errno;
-    else if (::fstat(fd_, &about) != 0)
+    if (fd_ < 0 || ::fstat(fd_, &about) != 0)
       reason_ = errno;
     else if (!S_ISREG(about.st_mode))
       reason_ = EINVAL;
