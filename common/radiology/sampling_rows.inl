@@ -116,7 +116,7 @@ void ray_rows(const HuLattice& lattice, const PlaneStrides& s, int first, int la
                 c = lower_of(pairs(plane, place + s.u)), d = lower_of(pairs(plane, place + (s.u + s.v)));
       value = mixed(mixed(a, b, cv.weight), mixed(c, d, cv.weight), cu.weight);
     }
-    const Row met = (at >= begin) & (at <= end) ? value : none;
+    const Row met = ((at >= begin) & (at <= end)) ? value : none;
     sum = kMost ? high(sum, met) : sum + met;
   }
   store(sums + lane, sum);
