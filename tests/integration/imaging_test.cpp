@@ -389,6 +389,9 @@ TEST_F(ImagingTest, EachStepCanBeCancelled) {
   part<QSpinBox>("threshold").setValue(300);
   ASSERT_TRUE(until([&] { return !idle(); }));
   cancel();
+  click("find_parts");
+  ASSERT_TRUE(until([&] { return found(2) && islands().isEnabled(); })) << words();
+  EXPECT_FALSE(part<QPushButton>("find_parts").isVisible());
   click("undo_edit");
   ASSERT_TRUE(until([&] { return found(2) && islands().isEnabled(); })) << words();
   islands().item(1)->setCheckState(Qt::Checked);

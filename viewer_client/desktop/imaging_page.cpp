@@ -190,6 +190,8 @@ QBoxLayout* ImagingPage::make_side() {
   island_list_->setFixedWidth(kListWidth_px);
   connect(island_list_, &QListWidget::itemChanged, this, [this](QListWidgetItem* item) { change_island(item); });
   column->addWidget(island_list_, 1);
+  find_ = add_button(*column, tr("Find the parts"), "find_parts", tr("Finds the parts that reach the threshold"),
+                     [this] { find_islands(); });
   keep_ = add_button(*column, tr("&Keep the bone at the crosshair"), "keep_bone",
                      tr("Puts a seed there, from which the bone grows. Two seeds in one part separate it."),
                      [this] { keep_at(scene_.crosshair); });
@@ -397,8 +399,8 @@ void ImagingPage::change_island(const QListWidgetItem* item) {
   ImagingEdits edits = history_.now();
   if (keep) {
     const auto centre = voxel_of(scene_.scan.geometry, island.centre_mm);
-    const auto seed = scene_.islands.seed_near(scene_.scan, island.number, found_hu_.value_or(0.0),
-                                               centre.value_or(scene_.crosshair));
+    const auto seed = scene_.islands.main_seed_near(scene_.scan, island.number, found_hu_.value_or(0.0),
+                                                    centre.value_or(scene_.crosshair));
     if (seed) edits.seeds_mm.push_back(centre_of(scene_.scan.geometry, *seed));
   } else {
     std::erase_if(edits.seeds_mm, [&](const Vec3& seed) {
@@ -457,6 +459,8 @@ void ImagingPage::enable_parts() {
   const QString none = free ? tr("Choose a threshold that bone reaches.") : wait;
   set_enabled(*back_, !making, wait);
   set_enabled(*threshold_, !making, wait);
+  // After a search that was cancelled or failed.
+  find_->setVisible(free && !changing && scene_.open() && history_.now().threshold_hu != found_hu_);
   set_enabled(*keep_, found, none);
   set_enabled(*island_list_, found, none);
   set_enabled(*undo_, !making && (changing || history_.can_undo()), making ? wait : tr("There is nothing to undo."));

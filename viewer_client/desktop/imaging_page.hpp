@@ -97,7 +97,7 @@ class ImagingPage : public QWidget {
   QListWidget *series_list_, *island_list_;
   QLabel *words_, *readout_;
   QProgressBar* progress_;
-  QPushButton *cancel_, *back_, *keep_, *undo_, *redo_, *make_;
+  QPushButton *cancel_, *back_, *find_, *keep_, *undo_, *redo_, *make_;
   QComboBox* preset_;
   QSpinBox* threshold_;
   ImagingHistogram* histogram_;

@@ -69,6 +69,55 @@ std::optional<std::array<int, 3>> IslandMap::seed_near(const ShownScan& scan, in
   return nearest;
 }
 
+std::vector<bool> IslandMap::growing(const ShownScan& scan, int island, double threshold_hu) const {
+  std::vector<bool> may(numbers_.values.size());
+  for (std::size_t n = 0; n < may.size(); ++n)
+    may[n] = numbers_.values[n] == island && !(scan.at(in_scan(n)) < threshold_hu);
+  return may;
+}
+
+std::array<int, 3> IslandMap::in_scan(std::size_t index) const {
+  const auto columns = static_cast<std::size_t>(numbers_.geometry.dims[0]);
+  const auto rows = static_cast<std::size_t>(numbers_.geometry.dims[1]);
+  return {static_cast<int>(index % columns) + first_[0], static_cast<int>(index / columns % rows) + first_[1],
+          static_cast<int>(index / columns / rows) + first_[2]};
+}
+
+std::optional<std::array<int, 3>> IslandMap::main_seed_near(const ShownScan& scan, int island, double threshold_hu,
+                                                            const std::array<int, 3>& voxel) const {
+  std::vector<bool> left = growing(scan, island, threshold_hu);  // and in no piece so far
+  const auto& dims = numbers_.geometry.dims;
+  const std::array<std::size_t, 3> step{1, static_cast<std::size_t>(dims[0]),
+                                        static_cast<std::size_t>(dims[0]) * static_cast<std::size_t>(dims[1])};
+  std::vector<std::size_t> largest, piece;
+  for (std::size_t n = 0; n < left.size(); ++n) {
+    if (!left[n]) continue;
+    piece.assign(1, n);
+    left[n] = false;
+    const auto take = [&](std::size_t index) {
+      if (!left[index]) return;
+      left[index] = false;
+      piece.push_back(index);
+    };
+    for (std::size_t next = 0; next < piece.size(); ++next) {
+      const std::size_t from = piece[next];
+      const std::array<int, 3> at = in_scan(from);
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        if (at[axis] > first_[axis]) take(from - step[axis]);
+        if (at[axis] + 1 < first_[axis] + dims[axis]) take(from + step[axis]);
+      }
+    }
+    if (piece.size() > largest.size()) largest.swap(piece);
+  }
+  if (largest.empty()) return {};
+  const Vec3 step_mm = scan.geometry.axes_mm.colwise().norm();
+  const auto far_mm2 = [&](std::size_t index) {
+    const std::array<int, 3> at = in_scan(index);
+    return Vec3(at[0] - voxel[0], at[1] - voxel[1], at[2] - voxel[2]).cwiseProduct(step_mm).squaredNorm();
+  };
+  return in_scan(*std::ranges::min_element(largest, {}, far_mm2));
+}
+
 std::vector<Vec3> IslandMap::moved_seeds(const ShownScan& scan, double threshold_hu,
                                          std::span<const Vec3> seeds_mm) const {
   std::vector<Vec3> moved;

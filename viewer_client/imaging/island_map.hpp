@@ -1,6 +1,7 @@
 // The islands of a scan: which voxel belongs to which, and where a seed in one of them is.
 #pragma once
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <span>
@@ -36,12 +37,20 @@ class IslandMap {
   // such voxels only. Nothing: the island has none.
   [[nodiscard]] std::optional<std::array<int, 3>> seed_near(const ShownScan& scan, int island, double threshold_hu,
                                                             const std::array<int, 3>& voxel) const;
+  // The same in the largest piece of the island that is connected across faces, because a seed grows across them. Other
+  // pieces touch that one at corners and edges only.
+  [[nodiscard]] std::optional<std::array<int, 3>> main_seed_near(const ShownScan& scan, int island, double threshold_hu,
+                                                                 const std::array<int, 3>& voxel) const;
   // Seeds that were put at another threshold, as they are at this one: what lies below it moves within its island, and
   // what lies in no island goes.
   [[nodiscard]] std::vector<Vec3> moved_seeds(const ShownScan& scan, double threshold_hu,
                                               std::span<const Vec3> seeds_mm) const;
 
  private:
+  // Whether a bone may grow through a voxel of the part.
+  [[nodiscard]] std::vector<bool> growing(const ShownScan& scan, int island, double threshold_hu) const;
+  [[nodiscard]] std::array<int, 3> in_scan(std::size_t index) const;
+
   std::array<int, 3> first_{};  // of the part, in the scan
   VoxelFile<std::uint8_t> numbers_;
 };

@@ -690,6 +690,14 @@
         <translation>Teile aus Knochen</translation>
     </message>
     <message>
+        <source>Find the parts</source>
+        <translation>Teile suchen</translation>
+    </message>
+    <message>
+        <source>Finds the parts that reach the threshold</source>
+        <translation>Sucht die Teile, die den Schwellwert erreichen</translation>
+    </message>
+    <message>
         <source>&amp;Keep the bone at the crosshair</source>
         <translation>Knochen am Faden&amp;kreuz behalten</translation>
     </message>

@@ -74,6 +74,25 @@ TEST(IslandMap, GivesTheNearestSeedAboveTheThreshold) {
   EXPECT_FALSE(map->seed_near(scan, 3, 200.0, {3, 3, 3}));
 }
 
+// A crumb that hangs on a bone by a corner is nearer to the bone's middle than the bone. It is no seed of the bone.
+TEST(IslandMap, GivesASeedOfTheLargestPiece) {
+  ShownScan scan = scan_of(8);
+  auto part = part_of(scan, {2, 2, 2});
+  const auto put = [&](const Voxel& at) {
+    scan.values[scan.index(at)] = 900;
+    part.values[part.index({at[0] - 2, at[1] - 2, at[2] - 2})] = 1;
+  };
+  put({2, 2, 2});  // the crumb
+  for (const Voxel& at : {Voxel{3, 3, 3}, {3, 3, 4}, {3, 3, 5}, {4, 3, 5}, {5, 3, 5}, {5, 4, 5}}) put(at);
+  const auto map = IslandMap::make(scan.geometry, part);
+  ASSERT_TRUE(map);
+  EXPECT_EQ(map->seed_near(scan, 1, 200.0, {2, 2, 2}), (Voxel{2, 2, 2}));
+  EXPECT_EQ(map->main_seed_near(scan, 1, 200.0, {2, 2, 2}), (Voxel{3, 3, 3}));
+  EXPECT_EQ(map->main_seed_near(scan, 1, 200.0, {5, 5, 5}), (Voxel{5, 4, 5}));
+  EXPECT_FALSE(map->main_seed_near(scan, 1, 901.0, {2, 2, 2}));
+  EXPECT_FALSE(map->main_seed_near(scan, 2, 200.0, {2, 2, 2}));
+}
+
 // What a person has ticked at a low threshold is still what is made at a high one.
 TEST(IslandMap, MovesSeedsAboveTheThreshold) {
   ShownScan scan = scan_of(8);
