@@ -186,7 +186,7 @@ TEST_F(CArmTest, ShowsAHoleCountsItsShotsAndKeepsThem) {
   EXPECT_EQ(shots(), 0u);
   EXPECT_FALSE(fs::exists(session / kShotFileName));
 
-  // Along the hole ∫ μ dl falls by what was there. Glare is equal before and after, so it falls out of the difference.
+  // Along the hole ∫ μ dl falls by what was there. Glare is equal before and after, so the difference has none.
   const auto before = shoot();
   EXPECT_EQ(label("c_arm_shots"), "1");
   bore();

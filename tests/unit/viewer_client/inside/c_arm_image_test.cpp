@@ -133,7 +133,7 @@ TEST_F(CArmPictures, AShotFromANewPlaceIsCoarseFirst) {
   EXPECT_NE(next[0]->grey, both[1]->grey);
 }
 
-// Photons behind the plate are those of the kerma, times exp(−μ d). Brightness control gives 600 in each mm² behind it.
+// Photons behind the plate are those of the kerma, times exp(−μ d). Brightness control gives 600 in each mm² there.
 // The dose-area product is the kerma at 1 m on the detector there: 30 x 22.5 cm.
 TEST_F(CArmPictures, PhotonsFollowTheLawOfBeerAndLambert) {
   Arm arm({.glare = 0.0});
