@@ -519,6 +519,26 @@ TEST_F(WrongUse, SessionsAreNamedInTheLanguageOfTheWindow) {
   fs::remove_all(example_folder(pelvis));
 }
 
+TEST_F(WrongUse, AnImportIsNeverTakenForAnExample) {
+  const auto bones = example_bones();
+  const auto tibia = std::ranges::find(bones, QString("tibia"), &ExampleBone::id);
+  ASSERT_NE(tibia, bones.end());
+  const fs::path before = example_folder(*tibia);
+  EXPECT_NE(new_case_folder("/scans/tibia"), before) << "also while nobody has opened the example";
+  // An older window has imported a scan into it.
+  fs::create_directories(before);
+  put_bytes(before / "case.json", R"({"title": "Right leg", "source": "DICOM CT, 9 slices"})");
+  EXPECT_EQ(case_title(before), "Right leg");
+  EXPECT_FALSE(can_be_made_again(before)) << "its scan may be gone";
+  const fs::path now = example_folder(*tibia);
+  EXPECT_NE(now, before);
+  EXPECT_EQ(case_title(now), "Tibia, a phantom");
+  EXPECT_NE(new_case_folder("/scans/tibia-example"), now);
+  put_bytes(before / "case.json", R"({"title": "A bone", "source": "parametric phantom, tibia"})");
+  EXPECT_EQ(case_title(before), "Tibia, a phantom");
+  fs::remove_all(before);
+}
+
 TEST_F(WrongUse, WhatWasLeftBehindGoesWhenTheOnlyWindowCloses) {
   const std::string needed(64, 'a'), unneeded(64, 'b'), dead = std::to_string(dead_pid()),
                                                         alive = std::to_string(::getpid());
