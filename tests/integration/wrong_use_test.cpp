@@ -44,6 +44,7 @@
 #include "tests/support/failing/failing_writes.hpp"
 #include "tests/support/process.hpp"
 #include "tests/support/size_limit.hpp"
+#include "viewer_client/desktop/child_process.hpp"
 #include "viewer_client/desktop/language.hpp"
 #include "viewer_client/desktop/sound_dialog.hpp"
 #include "viewer_client/desktop/stale_files.hpp"
@@ -265,6 +266,19 @@ TEST_F(WrongUse, ADiskThatFillsUpEndsTheSessionAndKeepsTheCut) {
   disk.make_room();
   open(folder);
   EXPECT_TRUE(cut());
+}
+
+// Of a program that could not write its log.
+TEST_F(WrongUse, AFullDiskIsTheReasonOfAProgramWithoutAny) {
+  constexpr qint64 kMiB = 1024LL * 1024;
+  EXPECT_EQ(sentence_of_disk("/data", 0), "The disk with /data is full; make room on the disk.");
+  EXPECT_FALSE(sentence_of_disk("/data", kMiB - 1).isEmpty());
+  EXPECT_TRUE(sentence_of_disk("/data", kMiB).isEmpty());
+  speak("de");
+  EXPECT_EQ(sentence_of_disk("/data", 0), "Der Datenträger mit /data ist voll; schaffen Sie dort Platz.");
+  speak("en");
+  // This one has room.
+  EXPECT_EQ(ChildProcess(QString::fromStdString((desk_->temp() / "silent.log").string())).last_sentence(), QString());
 }
 
 // As after a crash of the machine: half of the bone is there, then not even case.json.
