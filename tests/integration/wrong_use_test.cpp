@@ -44,6 +44,7 @@
 #include "tests/support/failing/failing_writes.hpp"
 #include "tests/support/process.hpp"
 #include "tests/support/size_limit.hpp"
+#include "viewer_client/desktop/child_process.hpp"
 #include "viewer_client/desktop/language.hpp"
 #include "viewer_client/desktop/sound_dialog.hpp"
 #include "viewer_client/desktop/stale_files.hpp"
@@ -265,6 +266,19 @@ TEST_F(WrongUse, ADiskThatFillsUpEndsTheSessionAndKeepsTheCut) {
   disk.make_room();
   open(folder);
   EXPECT_TRUE(cut());
+}
+
+// Of a program that could not write its log.
+TEST_F(WrongUse, AFullDiskIsTheReasonOfAProgramWithoutAny) {
+  constexpr qint64 kMiB = 1024LL * 1024;
+  EXPECT_EQ(sentence_of_disk("/data", 0), "The disk with /data is full; make room on the disk.");
+  EXPECT_FALSE(sentence_of_disk("/data", kMiB - 1).isEmpty());
+  EXPECT_TRUE(sentence_of_disk("/data", kMiB).isEmpty());
+  speak("de");
+  EXPECT_EQ(sentence_of_disk("/data", 0), "Der Datenträger mit /data ist voll; schaffen Sie dort Platz.");
+  speak("en");
+  // This one has room.
+  EXPECT_EQ(ChildProcess(QString::fromStdString((desk_->temp() / "silent.log").string())).last_sentence(), QString());
 }
 
 // As after a crash of the machine: half of the bone is there, then not even case.json.
@@ -517,6 +531,26 @@ TEST_F(WrongUse, SessionsAreNamedInTheLanguageOfTheWindow) {
   EXPECT_EQ(recent_entries().front().title, "Knie, gestern");
   settings.remove("recent");
   fs::remove_all(example_folder(pelvis));
+}
+
+TEST_F(WrongUse, AnImportIsNeverTakenForAnExample) {
+  const auto bones = example_bones();
+  const auto tibia = std::ranges::find(bones, QString("tibia"), &ExampleBone::id);
+  ASSERT_NE(tibia, bones.end());
+  const fs::path before = example_folder(*tibia);
+  EXPECT_NE(new_case_folder("/scans/tibia"), before) << "also while nobody has opened the example";
+  // An older window has imported a scan into it.
+  fs::create_directories(before);
+  put_bytes(before / "case.json", R"({"title": "Right leg", "source": "DICOM CT, 9 slices"})");
+  EXPECT_EQ(case_title(before), "Right leg");
+  EXPECT_FALSE(can_be_made_again(before)) << "its scan may be gone";
+  const fs::path now = example_folder(*tibia);
+  EXPECT_NE(now, before);
+  EXPECT_EQ(case_title(now), "Tibia, a phantom");
+  EXPECT_NE(new_case_folder("/scans/tibia-example"), now);
+  put_bytes(before / "case.json", R"({"title": "A bone", "source": "parametric phantom, tibia"})");
+  EXPECT_EQ(case_title(before), "Tibia, a phantom");
+  fs::remove_all(before);
 }
 
 TEST_F(WrongUse, WhatWasLeftBehindGoesWhenTheOnlyWindowCloses) {

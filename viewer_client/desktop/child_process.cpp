@@ -5,6 +5,7 @@
 #include <QCoreApplication>
 #include <QFile>
 #include <QFileInfo>
+#include <QStorageInfo>
 #include <algorithm>
 #include <csignal>
 #include <utility>
@@ -14,6 +15,7 @@ namespace osteon {
 namespace {
 constexpr std::chrono::milliseconds kPatience{2000};
 constexpr int kKilled_ms = 2000;  // the kernel ends it at once, except in the middle of a call to a broken disk
+constexpr qint64 kFull_bytes = 1 << 20;
 }  // namespace
 
 ChildProcess::ChildProcess(const QString& log_file) : log_file_(log_file) {
@@ -37,6 +39,15 @@ void ChildProcess::end(std::chrono::milliseconds patience) {
 }
 
 QString ChildProcess::last_sentence() const {
+  const QString said = last_line();
+  if (!said.isEmpty()) return said;
+  const QString folder = QFileInfo(log_file_).absolutePath();
+  const QStorageInfo disk(folder);
+  // Some file systems tell no size.
+  return disk.isValid() && disk.bytesTotal() > 0 ? sentence_of_disk(folder, disk.bytesAvailable()) : QString();
+}
+
+QString ChildProcess::last_line() const {
   QFile file(log_file_);
   if (!file.open(QIODevice::ReadOnly)) return {};
   constexpr qint64 kEnd = 4096;
@@ -46,6 +57,11 @@ QString ChildProcess::last_sentence() const {
 }
 
 void ChildProcess::setupChildProcess() { ::prctl(PR_SET_PDEATHSIG, SIGTERM); }
+
+QString sentence_of_disk(const QString& folder, qint64 available_bytes) {
+  if (available_bytes >= kFull_bytes) return {};
+  return QCoreApplication::translate("ChildProcess", "The disk with %1 is full; make room on the disk.").arg(folder);
+}
 
 QString program_path(const QString& name) {
   const QString beside = QCoreApplication::applicationDirPath() + '/' + name;

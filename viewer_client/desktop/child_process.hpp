@@ -20,17 +20,22 @@ class ChildProcess : public QProcess {
   // Asks it to end, waits so long, and then ends it by force.
   void end(std::chrono::milliseconds patience);
 
-  // The last line of the log file: the sentence with which an Osteon program ends. Empty: there is none.
+  // The last line of the log file: the sentence with which an Osteon program ends. Without it, that of a full disk, on
+  // which the program could not write it. Empty: there is neither.
   [[nodiscard]] QString last_sentence() const;
 
  protected:
   void setupChildProcess() override;
 
  private:
+  [[nodiscard]] QString last_line() const;
+
   QString log_file_;
   bool asked_ = false;  // to end; a second signal would end it in a hurry
 };
 
+// For a person, if the disk of the folder has less than 1 MiB left. Else empty.
+[[nodiscard]] QString sentence_of_disk(const QString& folder, qint64 available_bytes);
 // An Osteon program beside this one. Its bare name, if it is not there: then PATH decides.
 [[nodiscard]] QString program_path(const QString& name);
 [[nodiscard]] QString text_of(const std::filesystem::path& path);

@@ -9,6 +9,8 @@
 #include <QLocale>
 #include <QSettings>
 #include <QStandardPaths>
+#include <algorithm>
+#include <array>
 #include <utility>
 
 #include "viewer_client/desktop/file_lock.hpp"
@@ -22,6 +24,25 @@ constexpr int kMostRecent = 12;
 constexpr const char* kSkullScan = "/usr/share/doc/invesalius-examples/examples/Cranium.inv3";
 
 std::filesystem::path path_of(const QString& text) { return text.toStdString(); }
+
+// A text of its case.json. Empty: there is none.
+QString text_in_case(const std::filesystem::path& bone, const char* key) {
+  QFile file(text_of(bone / "case.json"));
+  if (!file.open(QIODevice::ReadOnly)) return {};
+  return QJsonDocument::fromJson(file.readAll()).object().value(key).toString();
+}
+
+// If an older window has imported a scan into the first one, the case of the example is in the second one.
+std::array<std::filesystem::path, 2> folders_of(const ExampleBone& bone) {
+  const std::filesystem::path first = cases_folder() / bone.id.toStdString();
+  return {first, first.string() + "-example"};
+}
+
+bool is_name_of_example(const std::filesystem::path& folder) {
+  for (const ExampleBone& example : example_bones())
+    if (std::ranges::count(folders_of(example), folder) > 0) return true;
+  return false;
+}
 
 }  // namespace
 
@@ -48,7 +69,13 @@ std::vector<ExampleBone> example_bones() {
 
 std::filesystem::path cases_folder() { return data_folder() / "cases"; }
 
-std::filesystem::path example_folder(const ExampleBone& bone) { return cases_folder() / bone.id.toStdString(); }
+std::filesystem::path example_folder(const ExampleBone& bone) {
+  const auto [first, second] = folders_of(bone);
+  // The source begins so. A damaged case has none, and may be made anew.
+  const QString source = text_in_case(first, "source").section(',', 0, 0);
+  const bool is_own = source.isEmpty() || source.endsWith(bone.how.front() == "phantom" ? " phantom" : "InVesalius CT");
+  return is_own ? first : second;
+}
 
 std::filesystem::path new_case_folder(const QString& source) {
   QString name = QFileInfo(source).completeBaseName();
@@ -56,7 +83,8 @@ std::filesystem::path new_case_folder(const QString& source) {
   std::filesystem::path out = cases_folder() / name.toStdString();
   // The edit list of a case that somebody removed may be all that is left of it.
   const auto is_taken = [](const std::filesystem::path& bone) {
-    return std::filesystem::exists(bone) || std::filesystem::exists(bone.string() + ".edits.yaml");
+    return is_name_of_example(bone) || std::filesystem::exists(bone) ||
+           std::filesystem::exists(bone.string() + ".edits.yaml");
   };
   for (int n = 2; is_taken(out); ++n) out = cases_folder() / (name.toStdString() + "-" + std::to_string(n));
   return out;
@@ -97,10 +125,7 @@ bool is_case(const std::filesystem::path& folder) {
 QString case_title(const std::filesystem::path& bone) {
   for (const ExampleBone& example : example_bones())
     if (bone == example_folder(example)) return example.title;
-  QFile file(text_of(bone / "case.json"));
-  QString title;
-  if (file.open(QIODevice::ReadOnly))
-    title = QJsonDocument::fromJson(file.readAll()).object().value("title").toString();
+  const QString title = text_in_case(bone, "title");
   return title.isEmpty() ? text_of(bone.filename()) : title;
 }
 

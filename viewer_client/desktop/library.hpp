@@ -42,7 +42,7 @@ void remember(const RecentEntry& entry);
 [[nodiscard]] std::filesystem::path data_folder();
 [[nodiscard]] std::filesystem::path cases_folder();                           // of the cases that the window has made
 [[nodiscard]] std::filesystem::path example_folder(const ExampleBone& bone);  // of its case
-// Of a case to import from a file or folder: its name, with a number if there is such a case or edit list.
+// Of a case to import from a file or folder: its name, with a number if an example, a case or an edit list has it.
 // It is not made.
 [[nodiscard]] std::filesystem::path new_case_folder(const QString& source);
 // Made at once, so that no other window takes the same one. If it cannot be made, it is not there.

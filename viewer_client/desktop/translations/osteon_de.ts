@@ -222,6 +222,13 @@
     </message>
 </context>
 <context>
+    <name>ChildProcess</name>
+    <message>
+        <source>The disk with %1 is full; make room on the disk.</source>
+        <translation>Der Datenträger mit %1 ist voll; schaffen Sie dort Platz.</translation>
+    </message>
+</context>
+<context>
     <name>ClippingPanel</name>
     <message>
         <source>A box</source>
