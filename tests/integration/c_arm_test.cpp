@@ -189,6 +189,8 @@ TEST_F(CArmTest, ShowsAHoleCountsItsShotsAndKeepsThem) {
   // Along the hole ∫ μ dl falls by what was there. Glare is equal before and after, so the difference has none.
   const auto before = shoot();
   EXPECT_EQ(label("c_arm_shots"), "1");
+  EXPECT_EQ(window_->findChild<QWidget*>("c_arm_last")->accessibleName(),
+            "The last picture: left R, right L, top P, bottom A");
   bore();
   ASSERT_LT(deepest_.position_mm.z(), -9.0);
   const double deep_mm = -deepest_.position_mm.z() - kCortex_mm;  // of the hole in the marrow

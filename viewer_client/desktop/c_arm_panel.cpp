@@ -23,6 +23,7 @@
 
 #include "common/core/mutex.hpp"
 #include "common/runtime/files.hpp"
+#include "viewer_client/desktop/edge_letters.hpp"
 #include "viewer_client/desktop/enabled.hpp"
 #include "viewer_client/desktop/inside_link.hpp"
 
@@ -48,26 +49,35 @@ const PedalKey* pedal_of(int key) {
   return nullptr;
 }
 
-QImage image_of(const CArmPicture& picture) {
-  return QImage(picture.grey.data(), picture.columns, picture.rows, picture.columns, QImage::Format_Grayscale8).copy();
+ScreenPicture screen_picture(const CArmPicture& picture) {
+  const QImage image(picture.grey.data(), picture.columns, picture.rows, picture.columns, QImage::Format_Grayscale8);
+  return {image.copy(), picture.letters};
 }
 
 }  // namespace
 
-// A picture as large as there is room for it, on black.
+// A picture as large as there is room for it, on black, with the letters of the patient's sides.
 class CArmScreen : public QWidget {
   Q_DECLARE_TR_FUNCTIONS(CArmScreen)
 
  public:
-  CArmScreen(const QString& what, const char* name, int least_width) {
+  CArmScreen(const QString& what, const char* name, int least_width) : what_(what) {
     setObjectName(name);
     setAccessibleName(what);
     setToolTip(what);
     setMinimumSize(least_width, least_width * 3 / 4);
     setSizePolicy(QSizePolicy::Expanding, QSizePolicy::Expanding);
   }
-  void show_picture(const QImage& picture) {
+  void show_picture(const ScreenPicture& picture) {
     picture_ = picture;
+    const EdgeLetters& at = picture.letters;
+    const QString name = picture.image.isNull()
+                             ? what_
+                             : tr("%1: left %2, right %3, top %4, bottom %5")
+                                   .arg(what_, QString::fromStdString(at.left), QString::fromStdString(at.right),
+                                        QString::fromStdString(at.top), QString::fromStdString(at.bottom));
+    // A reader of the screen hears of a new name. Live pictures keep theirs.
+    if (name != accessibleName()) setAccessibleName(name);
     update();
   }
 
@@ -75,19 +85,21 @@ class CArmScreen : public QWidget {
   void paintEvent(QPaintEvent*) override {
     QPainter painter(this);
     painter.fillRect(rect(), Qt::black);
-    if (picture_.isNull()) {
+    if (picture_.image.isNull()) {
       painter.setPen(Qt::gray);
       painter.drawText(rect(), Qt::AlignCenter | Qt::TextWordWrap, tr("No picture yet"));
       return;
     }
-    QRect shown({}, picture_.size().scaled(size(), Qt::KeepAspectRatio));
+    QRect shown({}, picture_.image.size().scaled(size(), Qt::KeepAspectRatio));
     shown.moveCenter(rect().center());
     painter.setRenderHint(QPainter::SmoothPixmapTransform);
-    painter.drawImage(shown, picture_);
+    painter.drawImage(shown, picture_.image);
+    paint_edge_letters(painter, shown, picture_.letters);
   }
 
  private:
-  QImage picture_;
+  const QString what_;
+  ScreenPicture picture_;
 };
 
 struct CArmPanel::Mailbox {
@@ -331,7 +343,7 @@ void CArmPanel::show_status() {
   const QString reason = maximum() ? tr("Maximum intensity needs no X-rays. Choose X-ray first.") : trouble;
   for (QPushButton* pedal : {single_, pulse_, live_})
     if (pedal->isEnabled() != reason.isEmpty() || !reason.isEmpty()) set_enabled(*pedal, reason.isEmpty(), reason);
-  const bool any = !(maximum() ? projection_ : shot_).isNull();
+  const bool any = !(maximum() ? projection_ : shot_).image.isNull();
   if (save_->isEnabled() != any || !any) set_enabled(*save_, any, tr("There is no picture yet."));
 }
 
@@ -381,7 +393,7 @@ void CArmPanel::show_maximum() {
   if (maximum()) release();
   inside_.wake();
   last_->show_picture(maximum() ? projection_ : shot_);
-  before_->show_picture(maximum() ? QImage() : shot_before_);
+  before_->show_picture(maximum() ? ScreenPicture() : shot_before_);
   show_status();
 }
 
@@ -425,7 +437,7 @@ void CArmPanel::receive(const std::shared_ptr<const CArmPicture>& picture) {
   if (picture->order == 0) {
     if (!in_room_) return;
     // Kept while X-rays are shown, too: it is not made again unless something changes.
-    projection_ = image_of(*picture);
+    projection_ = screen_picture(*picture);
     if (!maximum()) return;
     last_->show_picture(projection_);
     return show_status();
@@ -434,7 +446,7 @@ void CArmPanel::receive(const std::shared_ptr<const CArmPicture>& picture) {
   if (came == CArmConsole::Came::dropped) return;
   if (came == CArmConsole::Came::shot) keep_shot();
   picture_ = picture;
-  shot_ = image_of(*picture);
+  shot_ = screen_picture(*picture);
   if (!maximum()) last_->show_picture(shot_);
   show_status();
   tick();
@@ -458,7 +470,7 @@ void CArmPanel::keep_shot() {
 }
 
 Result<void> CArmPanel::save(const std::filesystem::path& file, bool replace) const {
-  const QImage& shown = maximum() ? projection_ : shot_;
+  const QImage& shown = (maximum() ? projection_ : shot_).image;
   if (shown.isNull()) return failure(ErrorCode::not_found, "there is no picture yet; shoot one first");
   std::error_code ignored;
   if (!replace && std::filesystem::exists(file, ignored))

@@ -29,6 +29,12 @@ namespace osteon {
 class CArmScreen;
 class InsideLink;
 
+// As a screen of the C-arm shows it. Null image: there is none.
+struct ScreenPicture {
+  QImage image;
+  EdgeLetters letters;
+};
+
 // [GUI thread]
 class CArmPanel : public QWidget {
   Q_DECLARE_TR_FUNCTIONS(CArmPanel)
@@ -110,7 +116,7 @@ class CArmPanel : public QWidget {
 
   std::shared_ptr<const CArmPicture> picture_;
   CArmScreen *last_ = nullptr, *before_ = nullptr;
-  QImage shot_, shot_before_, projection_;
+  ScreenPicture shot_, shot_before_, projection_;
   QComboBox* kind_ = nullptr;
   QPushButton *single_ = nullptr, *pulse_ = nullptr, *live_ = nullptr, *save_ = nullptr;
   QLabel *shots_ = nullptr, *seconds_ = nullptr, *dose_ = nullptr, *words_ = nullptr;

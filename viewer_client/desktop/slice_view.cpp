@@ -8,28 +8,18 @@
 #include <cmath>
 #include <utility>
 
+#include "viewer_client/desktop/edge_letters.hpp"
+
 namespace osteon {
 
 namespace {
 
 constexpr double kNotchOfWheel = 120.0, kZoomOfNotch = 0.85;
 constexpr double kCrossGap_px = 6.0;  // of the cross round its middle, so that the tip is seen
-constexpr int kSliceEdge_px = 4;
 constexpr QRgb kToolColour = 0xfff0e442, kPlannedColour = 0xff56b4e9;
-
-// White letters are read on bone too.
-void write(QPainter& painter, const QRect& where, int flags, const QString& text, const QColor& colour = Qt::white) {
-  painter.setPen(Qt::black);
-  for (const QPoint& by : {QPoint(1, 0), QPoint(-1, 0), QPoint(0, 1), QPoint(0, -1)})
-    painter.drawText(where.translated(by), flags, text);
-  painter.setPen(colour);
-  painter.drawText(where, flags, text);
-}
 
 // The middle of the pixel of the screen under the pointer.
 QPointF place_under(const QMouseEvent& event) { return event.localPos() + QPointF(0.5, 0.5); }
-
-QString letters(const Vec3& direction) { return QString::fromStdString(patient_letters(direction)); }
 
 }  // namespace
 
@@ -125,7 +115,7 @@ void SliceView::paintEvent(QPaintEvent*) {
   painter.fillRect(rect(), Qt::black);
   if (!image_) {
     painter.setPen(Qt::white);
-    painter.drawText(rect().adjusted(kSliceEdge_px, kSliceEdge_px, -kSliceEdge_px, -kSliceEdge_px),
+    painter.drawText(rect().adjusted(kWordsEdge_px, kWordsEdge_px, -kWordsEdge_px, -kWordsEdge_px),
                      Qt::AlignCenter | Qt::TextWordWrap, notice_);
   } else {
     const double ratio = devicePixelRatioF();
@@ -169,27 +159,24 @@ void SliceView::paint_planned(QPainter& painter) const {
     painter.setPen(QPen(QColor(kPlannedColour), 1.5));
     const QPointF through = to_widget(*line->through);
     painter.drawEllipse(through, kThroughRing_px, kThroughRing_px);
-    write(painter, QRect(through.toPoint() + QPoint(6, -18), QSize(width(), 16)), Qt::AlignLeft | Qt::AlignVCenter,
-          planned.name, QColor(kPlannedColour));
+    write_outlined(painter, QRect(through.toPoint() + QPoint(6, -18), QSize(width(), 16)),
+                   Qt::AlignLeft | Qt::AlignVCenter, planned.name, QColor(kPlannedColour));
   }
 }
 
 void SliceView::paint_words(QPainter& painter) const {
   const radiology::PixelGrid& plane = image_->plane;
-  const QRect inner = rect().adjusted(kSliceEdge_px, kSliceEdge_px, -kSliceEdge_px, -kSliceEdge_px);
-  write(painter, inner, Qt::AlignTop | Qt::AlignLeft, title_, colour_);
-  write(painter, inner, Qt::AlignVCenter | Qt::AlignLeft, letters(-plane.column_mm));
-  write(painter, inner, Qt::AlignVCenter | Qt::AlignRight, letters(plane.column_mm));
-  write(painter, inner, Qt::AlignTop | Qt::AlignHCenter, letters(-plane.row_mm));
-  write(painter, inner, Qt::AlignBottom | Qt::AlignHCenter, letters(plane.row_mm));
+  const QRect inner = rect().adjusted(kWordsEdge_px, kWordsEdge_px, -kWordsEdge_px, -kWordsEdge_px);
+  write_outlined(painter, inner, Qt::AlignTop | Qt::AlignLeft, title_, colour_);
+  paint_edge_letters(painter, rect(), edge_letters(plane));
   const double mm_per_px = plane.column_mm.norm() * devicePixelRatioF();
   const double bar_mm = scale_bar_mm(width() * mm_per_px / 4.0), bar_px = bar_mm / mm_per_px;
   const QPointF end(inner.right(), inner.bottom() - 1), begin = end - QPointF(bar_px, 0);
   painter.setPen(QPen(Qt::white, 2));
   painter.drawLine(begin, end);
   const int decimals = bar_mm < 1.0 ? 1 : 0;
-  write(painter, inner.adjusted(0, 0, 0, -kSliceEdge_px), Qt::AlignBottom | Qt::AlignRight,
-        tr("%1 mm").arg(QLocale().toString(bar_mm, 'f', decimals)));
+  write_outlined(painter, inner.adjusted(0, 0, 0, -kWordsEdge_px), Qt::AlignBottom | Qt::AlignRight,
+                 tr("%1 mm").arg(QLocale().toString(bar_mm, 'f', decimals)));
 }
 
 void SliceView::resizeEvent(QResizeEvent* event) {

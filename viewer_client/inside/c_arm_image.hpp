@@ -13,6 +13,7 @@
 #include "viewer_client/inside/c_arm_console.hpp"
 #include "viewer_client/inside/inside_bone.hpp"
 #include "viewer_client/inside/metal_in_beam.hpp"
+#include "viewer_client/inside/slice_planes.hpp"
 
 namespace osteon {
 
@@ -22,6 +23,7 @@ struct CArmPicture {
   bool coarse = false;      // fewer and larger pixels; the whole picture follows, unless something newer does
   int columns = 0, rows = 0;
   std::vector<std::uint8_t> grey;  // row by row
+  EdgeLetters letters;             // of the patient's sides
   radiology::Contrast contrast;    // of a radiograph: which photons are black and white
 };
 

@@ -134,6 +134,11 @@ std::string patient_letters(const Vec3& direction) {
   return letters;
 }
 
+EdgeLetters edge_letters(const PixelGrid& plane) {
+  return {patient_letters(-plane.column_mm), patient_letters(plane.column_mm), patient_letters(-plane.row_mm),
+          patient_letters(plane.row_mm)};
+}
+
 double scale_bar_mm(double most_mm) {
   OSTEON_CHECK(most_mm > 0.0);
   const double power = std::pow(10.0, std::floor(std::log10(most_mm)));

@@ -46,6 +46,13 @@ struct LinkedSlices {
 // one first: the second is there from 22.5° [A] between direction and the first axis.
 [[nodiscard]] std::string patient_letters(const Vec3& direction);
 
+// The letters at the edges of an image.
+struct EdgeLetters {
+  std::string left, right, top, bottom;
+  friend bool operator==(const EdgeLetters&, const EdgeLetters&) = default;
+};
+[[nodiscard]] EdgeLetters edge_letters(const radiology::PixelGrid& plane);
+
 // A round length for a scale bar: 1, 2 or 5 times a power of ten, mm, at most `most_mm`, which is above zero.
 [[nodiscard]] double scale_bar_mm(double most_mm);
 

@@ -213,6 +213,10 @@
         <source>No picture yet</source>
         <translation>Noch kein Bild</translation>
     </message>
+    <message>
+        <source>%1: left %2, right %3, top %4, bottom %5</source>
+        <translation>%1: links %2, rechts %3, oben %4, unten %5</translation>
+    </message>
 </context>
 <context>
     <name>CaseMaker</name>

@@ -121,6 +121,8 @@ TEST_F(CArmPictures, AShotFromANewPlaceIsCoarseFirst) {
   EXPECT_EQ(both[1]->rows, 600);
   EXPECT_EQ(both[1]->grey.size(), 480000u);
   for (const auto& picture : both) EXPECT_EQ(picture->order, 3u);
+  // From above the head, with the face below.
+  for (const auto& picture : both) EXPECT_EQ(picture->letters, (EdgeLetters{"R", "L", "P", "A"}));
   EXPECT_EQ(both[0]->shot, both[1]->shot) << "the photons are there once";
   EXPECT_EQ(both[1]->shot.position, axial());
   EXPECT_EQ(both[1]->shot.seed, 73u);
@@ -230,6 +232,7 @@ TEST_F(CArmPictures, MaximumIntensityFollowsCutsWithoutAShot) {
   ASSERT_EQ(both.size(), 2u);
   EXPECT_EQ(both[1]->order, 0u);
   EXPECT_EQ(both[1]->shot, CArmShot{});
+  for (const auto& picture : both) EXPECT_EQ(picture->letters, (EdgeLetters{"R", "L", "P", "A"}));
   const auto grey_of = [](double hu) { return std::lround(255.0 * (hu + 200.0) / 2000.0); };
   const std::size_t middle = 300u * 800u + 400u;
   EXPECT_NEAR(both[1]->grey[middle], grey_of((kDensity_g_cm3 - 0.131) / 0.001067), 1.0);

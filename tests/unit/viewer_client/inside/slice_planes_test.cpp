@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "common/radiology/c_arm.hpp"
 #include "common/tools/tool.hpp"
 #include "common/tools/tool_solid.hpp"
 #include "viewer_client/inside/slice_point.hpp"
@@ -80,6 +81,31 @@ TEST(SlicePlanes, LettersNameThePatientsSides) {
   EXPECT_EQ(patient_letters(planes[0].column_mm) + patient_letters(planes[0].row_mm), "LP");
   EXPECT_EQ(patient_letters(planes[1].column_mm) + patient_letters(planes[1].row_mm), "LF");
   EXPECT_EQ(patient_letters(planes[2].column_mm) + patient_letters(planes[2].row_mm), "PF");
+}
+
+EdgeLetters letters_of_arm(double orbit_deg, double tilt_deg) {
+  radiology::CArm arm;
+  arm.orbit_rad = orbit_deg / 180.0 * std::numbers::pi;
+  arm.tilt_rad = tilt_deg / 180.0 * std::numbers::pi;
+  return edge_letters(radiology::beam_of(arm)->detector);
+}
+
+// Who looks at the image stands at the detector, and looks towards the tube.
+TEST(SlicePlanes, EdgesOfRadiographsNameThePatientsSides) {
+  // In front of the patient, eye to eye.
+  EXPECT_EQ(letters_of_arm(0, 0), (EdgeLetters{"R", "L", "H", "F"}));
+  // Behind the patient.
+  EXPECT_EQ(letters_of_arm(180, 0), (EdgeLetters{"L", "R", "H", "F"}));
+  // At the patient's left, with the head up: who faces the patient's right has the patient's front at the left hand.
+  EXPECT_EQ(letters_of_arm(90, 0), (EdgeLetters{"A", "P", "H", "F"}));
+  EXPECT_EQ(letters_of_arm(-90, 0), (EdgeLetters{"P", "A", "H", "F"}));
+  // Above the head. On the way there from the front, the eyes turn from the back to the feet. So the top of the image
+  // turns from the head to the back, and the sides stay.
+  EXPECT_EQ(letters_of_arm(0, 90), (EdgeLetters{"R", "L", "P", "A"}));
+  EXPECT_EQ(letters_of_arm(0, -90), (EdgeLetters{"R", "L", "A", "P"}));
+  // A third of the way to the patient's left: sin 30° is above sin 22.5°.
+  EXPECT_EQ(letters_of_arm(30, 0), (EdgeLetters{"RA", "LP", "H", "F"}));
+  EXPECT_EQ(letters_of_arm(0, 30), (EdgeLetters{"R", "L", "HP", "FA"}));
 }
 
 TEST(SlicePlanes, ScaleBarsAreRound) {
