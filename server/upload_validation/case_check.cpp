@@ -39,7 +39,8 @@ namespace fs = std::filesystem;
 using Clock = std::chrono::steady_clock;
 
 constexpr std::size_t kMostSaid = 64 * 1024;
-constexpr std::uint64_t kAddressesToMemory = 4;  // allocators and threads reserve addresses that they do not use
+// Allocators and threads reserve addresses that they do not use.
+[[maybe_unused]] constexpr std::uint64_t kAddressesToMemory = 4;
 
 tl::unexpected<Error> cannot_start(int reason) {
   return failure(ErrorCode::internal,
@@ -258,8 +259,10 @@ Result<CheckedCase> check_case(const fs::path& program, const fs::path& archive,
   out.close();
   // The limits apply before the process has read any of the case, or nearly. Whatever it does until then, it may do
   // anyway.
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)  // sanitizers reserve far more than they use
   child.limit(RLIMIT_DATA, quota.memory_bytes);
   child.limit(RLIMIT_AS, kAddressesToMemory * quota.memory_bytes);
+#endif
   child.limit(RLIMIT_FSIZE, quota.unpacked_bytes);
   child.limit(RLIMIT_CPU, static_cast<std::uint64_t>(2 * quota.time.count()));
 
