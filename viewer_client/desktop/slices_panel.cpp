@@ -115,7 +115,7 @@ void SlicesPanel::add_views(QBoxLayout& all) {
     };
     events.zoom = [this](double factor) { zoom(factor); };
     events.window = [this](double right, double down) { set_window(dragged(window_, right, down)); };
-    events.hovered = [this, i](std::optional<Vec3> point_mm) { show_hu(i, point_mm); };
+    events.hovered = [this, i](const std::optional<Vec3>& point_mm) { show_hu(i, point_mm); };
     events.resized = [this] { ask(); };
     views_[i] = new SliceView(std::move(events));
     views_[i]->setObjectName(kViewNames[i]);
