@@ -71,9 +71,8 @@ void add_case_commands(CLI::App& app, std::function<Result<void>()>& chosen) {
       ->required();
 }
 
-std::optional<int> case_check_command(int argc, char** argv) {
-  if (argc != 5 || std::strcmp(argv[1], "check-case") != 0) return {};
-  return run_case_check(argv[2], argv[3], argv[4]);
+void case_check_command(int argc, char** argv) {
+  if (argc == 5 && std::strcmp(argv[1], "check-case") == 0) run_case_check(argv[2], argv[3], argv[4]);
 }
 
 }  // namespace osteon

@@ -1,7 +1,6 @@
 // The commands for uploaded cases, osteon-server cases upload and list, and the process that validates an upload.
 #pragma once
 #include <functional>
-#include <optional>
 
 #include "common/core/result.hpp"
 
@@ -15,7 +14,7 @@ namespace osteon {
 void add_case_commands(CLI::App& app, std::function<Result<void>()>& chosen);
 
 // "check-case ARCHIVE FOLDER QUOTA", see server/upload_validation/case_check.hpp. It is not for people, so no help
-// names it. Returns the exit code, or nothing if the command line is another one.
-[[nodiscard]] std::optional<int> case_check_command(int argc, char** argv);
+// names it. Ends the process, unless the command line is another one.
+void case_check_command(int argc, char** argv);
 
 }  // namespace osteon

@@ -13,7 +13,7 @@
 int main(int argc, char** argv) {
   using namespace osteon;
   // What "unpack" starts: the process that reads a file of untrusted origin.
-  if (argc == 5 && std::string_view(argv[1]) == "check-case") return run_case_check(argv[2], argv[3], argv[4]);
+  if (argc == 5 && std::string_view(argv[1]) == "check-case") run_case_check(argv[2], argv[3], argv[4]);
   keep_no_large_freed_blocks();
   static constexpr const char* kProgram = "osteon-import";
   CLI::App app("Makes a case, the bone that osteon-server loads, from a CT scan, a label volume, a mesh or a phantom.",

@@ -33,8 +33,8 @@ inline constexpr std::string_view kSoundCase = "sound";
                                              const std::function<bool()>& stop = {});
 
 // [main of that program, before other threads] Gives up the rights that it does not need and checks the case. Then it
-// prints one line for the waiting process, and returns the exit code. `quota`: as check_case() writes it.
-[[nodiscard]] int run_case_check(const std::filesystem::path& archive, const std::filesystem::path& folder,
+// prints one line for the waiting process, and ends this one. `quota`: as check_case() writes it.
+[[noreturn]] void run_case_check(const std::filesystem::path& archive, const std::filesystem::path& folder,
                                  const std::string& quota);
 
 }  // namespace osteon
