@@ -7,6 +7,8 @@
 #include <QJsonObject>
 #include <QLocale>
 #include <QSaveFile>
+#include <cstdint>
+#include <limits>
 #include <system_error>
 #include <utility>
 
@@ -59,7 +61,9 @@ std::vector<ListedIsland> listed_islands(const QString& said) {
   for (const QJsonValue& value : QJsonDocument::fromJson(said.toUtf8()).object()["islands"].toArray()) {
     const QJsonObject of = value.toObject();
     const QJsonArray at = of["centre_mm"].toArray();
-    islands.push_back({of["number"].toInt(), of["kind"].toString().toStdString(), of["volume_cm3"].toDouble(),
+    const int number = of["number"].toInt();
+    if (number < 1 || number > std::numeric_limits<std::uint8_t>::max()) continue;  // voxels have a byte for it
+    islands.push_back({number, of["kind"].toString().toStdString(), of["volume_cm3"].toDouble(),
                        of["density_g_cm3"].toDouble(), Vec3(at[0].toDouble(), at[1].toDouble(), at[2].toDouble())});
   }
   return islands;
