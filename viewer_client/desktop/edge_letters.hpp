@@ -1,9 +1,9 @@
-// Words on a picture of the bone's inside, and the letters of the patient's sides at its edges.
+// Words on a picture, and the letters of the patient's sides at its edges.
 #pragma once
 #include <QColor>
 #include <QString>
 
-#include "viewer_client/inside/slice_planes.hpp"
+#include "viewer_client/imaging/patient_letters.hpp"
 
 class QPainter;
 class QRect;

@@ -10,6 +10,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "viewer_client/desktop/edge_letters.hpp"
+
 namespace osteon {
 
 namespace {
@@ -103,15 +105,11 @@ void ImagingPlane::paintEvent(QPaintEvent* /*event*/) {
   painter.setPen(kCrosshair);
   painter.drawLine(QPointF(picture.left(), y), QPointF(picture.right(), y));
   painter.drawLine(QPointF(x, picture.top()), QPointF(x, picture.bottom()));
-  const PlaneLetters letters = letters_of(plane_);
+  // Below the title, which may reach the middle.
+  paint_edge_letters(painter, all.toRect().adjusted(0, painter.fontMetrics().height(), 0, 0),
+                     letters_of(axes_, scene_.scan.geometry));
   painter.setPen(kLetter);
   const QRectF inside = all.adjusted(kPlaneMargin_px, kPlaneMargin_px, -kPlaneMargin_px, -kPlaneMargin_px);
-  painter.drawText(inside, Qt::AlignLeft | Qt::AlignVCenter, QChar(letters.left));
-  painter.drawText(inside, Qt::AlignRight | Qt::AlignVCenter, QChar(letters.right));
-  // Below the title, which may reach the middle.
-  painter.drawText(inside.adjusted(0, painter.fontMetrics().height(), 0, 0), Qt::AlignHCenter | Qt::AlignTop,
-                   QChar(letters.top));
-  painter.drawText(inside, Qt::AlignHCenter | Qt::AlignBottom, QChar(letters.bottom));
   painter.drawText(inside, Qt::AlignLeft | Qt::AlignTop,
                    tr("%1, %2 of %3").arg(title_of(plane_)).arg(through + 1).arg(axes_.slices));
   if (hasFocus()) {

@@ -168,7 +168,7 @@ void SliceView::paint_words(QPainter& painter) const {
   const radiology::PixelGrid& plane = image_->plane;
   const QRect inner = rect().adjusted(kWordsEdge_px, kWordsEdge_px, -kWordsEdge_px, -kWordsEdge_px);
   write_outlined(painter, inner, Qt::AlignTop | Qt::AlignLeft, title_, colour_);
-  paint_edge_letters(painter, rect(), edge_letters(plane));
+  paint_edge_letters(painter, rect(), edge_letters(plane.column_mm, plane.row_mm));
   const double mm_per_px = plane.column_mm.norm() * devicePixelRatioF();
   const double bar_mm = scale_bar_mm(width() * mm_per_px / 4.0), bar_px = bar_mm / mm_per_px;
   const QPointF end(inner.right(), inner.bottom() - 1), begin = end - QPointF(bar_px, 0);

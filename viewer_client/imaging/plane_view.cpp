@@ -42,17 +42,6 @@ int turned(int index, int count, bool flip) { return flip ? count - 1 - index : 
 
 }  // namespace
 
-PlaneLetters letters_of(Plane plane) {
-  switch (plane) {
-    case Plane::coronal:
-      return {'R', 'L', 'S', 'I'};
-    case Plane::sagittal:
-      return {'A', 'P', 'S', 'I'};
-    default:
-      return {'R', 'L', 'A', 'P'};
-  }
-}
-
 PlaneAxes axes_of(const ScanGeometry& geometry, Plane plane) {
   const std::array<int, 3> nearest = nearest_axes(geometry);
   const PlaneSides sides = sides_of(plane);
@@ -69,6 +58,11 @@ PlaneAxes axes_of(const ScanGeometry& geometry, Plane plane) {
   axes.rows = geometry.dims[static_cast<std::size_t>(axes.down)];
   axes.slices = geometry.dims[static_cast<std::size_t>(axes.through)];
   return axes;
+}
+
+EdgeLetters letters_of(const PlaneAxes& axes, const ScanGeometry& geometry) {
+  const Vec3 right = geometry.axes_mm.col(axes.right), down = geometry.axes_mm.col(axes.down);
+  return edge_letters(axes.flip_right ? Vec3(-right) : right, axes.flip_down ? Vec3(-down) : down);
 }
 
 std::array<int, 3> voxel_at(const PlaneAxes& axes, int column, int row, int slice) {

@@ -2,23 +2,17 @@
 #pragma once
 #include <array>
 #include <cstdint>
-#include <string_view>
 
 #include "common/volume/case_description.hpp"
+#include "viewer_client/imaging/patient_letters.hpp"
 
 namespace osteon {
 
 enum class Plane : std::uint8_t { axial, coronal, sagittal };
 inline constexpr std::array kPlanes{Plane::axial, Plane::coronal, Plane::sagittal};
 
-// The letters of the patient's sides at the sides of a plane, as radiologists look at it: left is on the right.
-struct PlaneLetters {
-  char left, right, top, bottom;
-};
-[[nodiscard]] PlaneLetters letters_of(Plane plane);
-
-// A plane goes along the voxels, so that each voxel is seen as it was measured. Where a scan lies oblique, the letters
-// are those of the nearest sides.
+// A plane goes along the voxels, so that each voxel is seen as it was measured. It is the one that is nearest to the
+// patient's, as radiologists look at it: left is on the right.
 struct PlaneAxes {
   int right = 0, down = 1, through = 2;        // axes of the voxels
   bool flip_right = false, flip_down = false;  // the index falls in that direction
@@ -27,6 +21,7 @@ struct PlaneAxes {
   int columns = 0, rows = 0, slices = 0;       // voxels along each
 };
 [[nodiscard]] PlaneAxes axes_of(const ScanGeometry& geometry, Plane plane);
+[[nodiscard]] EdgeLetters letters_of(const PlaneAxes& axes, const ScanGeometry& geometry);
 
 // The voxel at a column from the left and a row from the top.
 [[nodiscard]] std::array<int, 3> voxel_at(const PlaneAxes& axes, int column, int row, int slice);

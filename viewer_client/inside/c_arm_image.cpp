@@ -186,7 +186,7 @@ void CArmImage::show_shot(const Layers& layers, CArmShot& shot, std::uint64_t or
   picture->coarse = coarse;
   picture->columns = beam.detector.columns;
   picture->rows = beam.detector.rows;
-  picture->letters = edge_letters(beam.detector);
+  picture->letters = edge_letters(beam.detector.column_mm, beam.detector.row_mm);
   picture->contrast = radiology::automatic_window(photons);
   picture->grey = radiology::grey_of(photons, picture->contrast);
   shown_(std::move(picture));
@@ -198,7 +198,8 @@ void CArmImage::show_maximum_of(const Layers& layers, bool coarse) const {
   picture->coarse = coarse;
   picture->columns = layers.image.beam().detector.columns;
   picture->rows = layers.image.beam().detector.rows;
-  picture->letters = edge_letters(layers.image.beam().detector);
+  const radiology::PixelGrid& detector = layers.image.beam().detector;
+  picture->letters = edge_letters(detector.column_mm, detector.row_mm);
   picture->grey.resize(layers.image.values().size());
   std::ranges::transform(layers.image.values(), picture->grey.begin(), [](float hu) {
     return static_cast<std::uint8_t>(

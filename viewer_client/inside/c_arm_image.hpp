@@ -10,10 +10,10 @@
 #include "common/core/mutex.hpp"
 #include "common/radiology/intensifier.hpp"
 #include "common/radiology/radiograph.hpp"
+#include "viewer_client/imaging/patient_letters.hpp"
 #include "viewer_client/inside/c_arm_console.hpp"
 #include "viewer_client/inside/inside_bone.hpp"
 #include "viewer_client/inside/metal_in_beam.hpp"
-#include "viewer_client/inside/slice_planes.hpp"
 
 namespace osteon {
 

@@ -12,7 +12,6 @@ namespace {
 
 using radiology::PixelGrid;
 
-constexpr double kSecondLetter = 0.3826834;  // sin 22.5°
 constexpr double kNearlyParallel = 1e-9;
 
 Vec3 right_of(const PixelGrid& plane) { return plane.column_mm.normalized(); }
@@ -118,25 +117,6 @@ Pixel pixel_at(const PixelGrid& plane, const Vec3& point_mm) {
 
 double depth_mm(const PixelGrid& plane, const Vec3& point_mm) {
   return normal_of(plane).dot(point_mm - plane.first_mm);
-}
-
-std::string patient_letters(const Vec3& direction) {
-  constexpr std::array<std::array<char, 2>, 3> kLetters{{{'L', 'R'}, {'P', 'A'}, {'H', 'F'}}};
-  const Vec3 unit = direction.normalized();
-  std::array<std::size_t, 3> order{0, 1, 2};
-  std::ranges::stable_sort(order, std::greater{},
-                           [&](std::size_t axis) { return std::abs(unit[static_cast<Eigen::Index>(axis)]); });
-  std::string letters;
-  for (const std::size_t axis : {order[0], order[1]}) {
-    const double part = unit[static_cast<Eigen::Index>(axis)];
-    if (letters.empty() || std::abs(part) >= kSecondLetter) letters += kLetters[axis][part > 0.0 ? 0 : 1];
-  }
-  return letters;
-}
-
-EdgeLetters edge_letters(const PixelGrid& plane) {
-  return {patient_letters(-plane.column_mm), patient_letters(plane.column_mm), patient_letters(-plane.row_mm),
-          patient_letters(plane.row_mm)};
 }
 
 double scale_bar_mm(double most_mm) {

@@ -42,17 +42,6 @@ struct LinkedSlices {
 // How far a point is from the plane, along normal_of().
 [[nodiscard]] double depth_mm(const radiology::PixelGrid& plane, const Vec3& point_mm);
 
-// The letters of the patient's sides towards which a direction points: R, L, A, P, H and F (LPS). Up to two, the nearer
-// one first: the second is there from 22.5° [A] between direction and the first axis.
-[[nodiscard]] std::string patient_letters(const Vec3& direction);
-
-// The letters at the edges of an image.
-struct EdgeLetters {
-  std::string left, right, top, bottom;
-  friend bool operator==(const EdgeLetters&, const EdgeLetters&) = default;
-};
-[[nodiscard]] EdgeLetters edge_letters(const radiology::PixelGrid& plane);
-
 // A round length for a scale bar: 1, 2 or 5 times a power of ten, mm, at most `most_mm`, which is above zero.
 [[nodiscard]] double scale_bar_mm(double most_mm);
 

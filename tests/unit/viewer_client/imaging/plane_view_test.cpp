@@ -30,21 +30,21 @@ std::vector<ScanGeometry> scans() {
 
 // LPS.
 const std::map<char, Vec3> kSides{{'L', Vec3::UnitX()},  {'R', -Vec3::UnitX()}, {'P', Vec3::UnitY()},
-                                  {'A', -Vec3::UnitY()}, {'S', Vec3::UnitZ()},  {'I', -Vec3::UnitZ()}};
+                                  {'A', -Vec3::UnitY()}, {'H', Vec3::UnitZ()},  {'F', -Vec3::UnitZ()}};
 
 TEST(PlaneView, GoesToTheSidesThatItsLettersName) {
   for (const ScanGeometry& scan : scans())
     for (const Plane plane : kPlanes) {
       const PlaneAxes axes = axes_of(scan, plane);
-      const PlaneLetters letters = letters_of(plane);
+      const EdgeLetters letters = letters_of(axes, scan);
       const auto at = [&](int column, int row, int slice) {
         return centre_of(scan, voxel_at(axes, column, row, slice));
       };
       const Vec3 right = at(1, 0, 0) - at(0, 0, 0), down = at(0, 1, 0) - at(0, 0, 0), on = at(0, 0, 1) - at(0, 0, 0);
-      EXPECT_NEAR(right.dot(kSides.at(letters.right)), axes.right_mm, 1e-12);
-      EXPECT_NEAR(right.dot(kSides.at(letters.left)), -axes.right_mm, 1e-12);
-      EXPECT_NEAR(down.dot(kSides.at(letters.bottom)), axes.down_mm, 1e-12);
-      EXPECT_NEAR(down.dot(kSides.at(letters.top)), -axes.down_mm, 1e-12);
+      EXPECT_NEAR(right.dot(kSides.at(letters.right.at(0))), axes.right_mm, 1e-12);
+      EXPECT_NEAR(right.dot(kSides.at(letters.left.at(0))), -axes.right_mm, 1e-12);
+      EXPECT_NEAR(down.dot(kSides.at(letters.bottom.at(0))), axes.down_mm, 1e-12);
+      EXPECT_NEAR(down.dot(kSides.at(letters.top.at(0))), -axes.down_mm, 1e-12);
       // Slices count to the left, to the back or to the head.
       EXPECT_GT(on.sum(), 0.0);
     }
@@ -60,6 +60,10 @@ TEST(PlaneView, TakesTheNearestSidesOfAnObliqueScan) {
   EXPECT_EQ(axes.down, 2);
   EXPECT_EQ(axes.through, 1);
   EXPECT_TRUE(axes.flip_down);
+  EXPECT_EQ(letters_of(axes, scan), (EdgeLetters{"R", "L", "H", "F"}));
+  // Tilted by 30 degrees, the column that goes to the head goes to the front too.
+  scan.axes_mm = Eigen::AngleAxisd(0.5236, Vec3::UnitX()).toRotationMatrix();
+  EXPECT_EQ(letters_of(axes_of(scan, Plane::coronal), scan), (EdgeLetters{"R", "L", "HA", "FP"}));
 }
 
 TEST(PlaneView, FindsAVoxelAgain) {
