@@ -203,6 +203,22 @@ TEST_F(Inside, FollowsCutsAndUndoToTheLastBit) {
   EXPECT_EQ(copy->told(), copy->is());
 }
 
+// Slices and X-rays at once.
+TEST_F(Inside, TellsEachPainterWhatChanged) {
+  connect();
+  const auto inside = InsideBone::start(hold(), {.period = kNoRest});
+  const std::array copies{std::make_shared<Copy>(), std::make_shared<Copy>()};
+  for (const auto& copy : copies) inside->add(copy);
+  ASSERT_TRUE(wait_until([&] { return copies[0]->calls() > 0 && copies[1]->calls() > 0; }, kPatience));
+  room_.cut(3);
+  ASSERT_TRUE(has_newest(*inside));
+  EXPECT_NE(copies[0]->is(), all_hu(*BoneHu::make(bone_))) << "something was cut";
+  for (const auto& copy : copies) {
+    EXPECT_EQ(copy->told(), copy->is());
+    EXPECT_EQ(copy->wholes(), 1);
+  }
+}
+
 TEST_F(Inside, CallsAPainterAtAWakeAndWithTheWholeBoneFirst) {
   connect();
   const auto inside = InsideBone::start(hold(), {.period = kNoRest});
