@@ -85,6 +85,7 @@ void PointerFeed::choose(const PointerInput& input) {
     }
     law = *fits;
   }
+  if (tool != tool_) exchange_.wanted.want(tool);
   tool_ = tool;
   law_ = law;
 }

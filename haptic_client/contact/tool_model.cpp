@@ -12,6 +12,10 @@
 namespace osteon::haptic {
 namespace {
 
+MillingParams milling_of(const Tool& tool) { return {.diameter_mm = tool.diameter_mm}; }
+
+bool sides_cut(const Tool& tool) { return tool.kind == ToolKind::broach; }
+
 bool is_saw(ToolKind kind) { return kind == ToolKind::oscillating_saw || kind == ToolKind::reciprocating_saw; }
 
 // Number of points: so near each other that bone does not slip between them where it matters, about three pitches.
@@ -122,15 +126,20 @@ Feeding feeding(ToolKind kind) noexcept {
 }
 
 ToolModel::ToolModel(const Tool& definition, double pitch_mm, double blunt, int points)
-    : ToolModel(definition, pitch_mm, blunt, points, own_law(definition)) {}
-
-Result<ToolModel> ToolModel::make(const Tool& definition, double pitch_mm, double blunt, std::string_view law_name) {
-  const Result<const ForceLaw*> chosen = choose_law(definition, law_name);
-  if (!chosen) return tl::unexpected(chosen.error());
-  return ToolModel(definition, pitch_mm, blunt, 0, **chosen);
+    : ToolModel(definition, pitch_mm, blunt, own_law(definition)) {
+  make_points(points);
 }
 
-ToolModel::ToolModel(const Tool& definition, double pitch_mm, double blunt, int points, const ForceLaw& by)
+Result<ToolModel> ToolModel::make(const Tool& definition, double pitch_mm, double blunt, std::string_view law_name,
+                                  ToolPoints when) {
+  const Result<const ForceLaw*> chosen = choose_law(definition, law_name);
+  if (!chosen) return tl::unexpected(chosen.error());
+  ToolModel model(definition, pitch_mm, blunt, **chosen);
+  if (when == ToolPoints::now) model.make_points();
+  return model;
+}
+
+ToolModel::ToolModel(const Tool& definition, double pitch_mm, double blunt, const ForceLaw& by)
     : tool(definition),
       solid(touching_solid(definition)),
       feed(feeding(definition.kind)),
@@ -143,8 +152,19 @@ ToolModel::ToolModel(const Tool& definition, double pitch_mm, double blunt, int 
   inset = 0.5 * fine_pitch_mm + kQuantum_mm;
   law_tool = osteon::law_tool(tool);
   // A broach's sides face forward by their taper only, but they cut.
-  const bool sides_cut = tool.kind == ToolKind::broach;
-  if (sides_cut) least_facing = 0.5 * std::sin(tool.taper_rad);
+  if (sides_cut(tool)) least_facing = 0.5 * std::sin(tool.taper_rad);
+  const MillingParams milling = milling_of(tool);
+  // Far out, where the pole does not limit the arm; resistance is proportional to one over the arm.
+  constexpr double kFar_mm = 1e3;
+  for (std::size_t i = 0; i < strength.size(); ++i)
+    strength[i] =
+        static_cast<float>(kFar_mm * milling_resistance(milling, 1.0, kFar_mm,
+                                                        kMostDensity_g_cm3 * static_cast<double>(i) / kDensitySteps));
+  spindle = motor_of(tool);
+  if (is_saw(tool.kind)) stroke = tool.kind == ToolKind::oscillating_saw ? Vec3::UnitX() : Vec3::UnitZ();
+}
+
+void ToolModel::make_points(int points) {
   for (const SamplePoint& p : points_of(tool, points > 0 ? points : points_for(tool, fine_pitch_mm))) {
     const double axis_mm = std::hypot(p.position_mm.x(), p.position_mm.y());
     // A screw's thread presses into the wall of its hole, which is its core: it does not hold the screw back.
@@ -153,7 +173,7 @@ ToolModel::ToolModel(const Tool& definition, double pitch_mm, double blunt, int 
       continue;
     const ContactPoint point{p.position_mm, p.position_mm + inset * p.inward, -p.inward, p.area_mm2, axis_mm};
     // A drill's flutes hold it in its hole but do not cut sideways, so only the point is active.
-    const bool cuts = p.active && (!axial || point.outward.z() > (sides_cut ? least_facing : 0.1));
+    const bool cuts = p.active && (!axial || point.outward.z() > (sides_cut(tool) ? least_facing : 0.1));
     (cuts ? active : passive).push_back(point);
     if (cuts) active_area_mm2 += point.area_mm2;
   }
@@ -163,17 +183,8 @@ ToolModel::ToolModel(const Tool& definition, double pitch_mm, double blunt, int 
     share_edge(*this, active);
   // The tip of a tool with a point. It has no area, and rings leave it out.
   if (point_height_mm(tool) > 0.0) active.push_back({Vec3::Zero(), {0, 0, -inset}, Vec3::UnitZ(), 0.0, 0.0});
-  const MillingParams milling{.diameter_mm = tool.diameter_mm};
-  contact = contact_set(active, passive, milling.pole_radius * 0.5 * tool.diameter_mm);
+  contact = contact_set(active, passive, milling_of(tool).pole_radius * 0.5 * tool.diameter_mm);
   OSTEON_CHECK(contact.groups() * kGroupPoints <= kMostContactPoints);
-  // Far out, where the pole does not limit the arm; resistance is proportional to one over the arm.
-  constexpr double kFar_mm = 1e3;
-  for (std::size_t i = 0; i < strength.size(); ++i)
-    strength[i] =
-        static_cast<float>(kFar_mm * milling_resistance(milling, 1.0, kFar_mm,
-                                                        kMostDensity_g_cm3 * static_cast<double>(i) / kDensitySteps));
-  spindle = motor_of(tool);
-  if (is_saw(tool.kind)) stroke = tool.kind == ToolKind::oscillating_saw ? Vec3::UnitX() : Vec3::UnitZ();
 }
 
 }  // namespace osteon::haptic

@@ -25,6 +25,9 @@ enum class Feeding : std::uint8_t {
 // Largest number of points of the haptic loop, including those that fill up groups.
 inline constexpr int kMostContactPoints = 8192;
 
+// Points on a tool's surface take up to 0.2 s. Everything else of its model takes less than a millisecond.
+enum class ToolPoints : std::uint8_t { now, later };
+
 struct ToolModel {
   Tool tool;
   Implicit solid;  // cutting part and shank, of a saw over its whole stroke; made once
@@ -51,11 +54,15 @@ struct ToolModel {
   // chosen from the tool's size.
   ToolModel(const Tool& tool, double pitch_mm, double wear = 1.0, int points = 0);
   // As the constructor, but uses the law of this name, if it is not empty. Error invalid_input: that of choose_law.
-  [[nodiscard]] static Result<ToolModel> make(const Tool& tool, double pitch_mm, double wear,
-                                              std::string_view law_name);
+  [[nodiscard]] static Result<ToolModel> make(const Tool& tool, double pitch_mm, double wear, std::string_view law_name,
+                                              ToolPoints when = ToolPoints::now);
+  // Makes active, passive, contact and active_area_mm2 of a model without points. It reads and writes neither wear nor
+  // law.
+  void make_points(int points = 0);
+  [[nodiscard]] bool has_points() const noexcept { return contact.groups() > 0; }
 
  private:
-  ToolModel(const Tool& tool, double pitch_mm, double wear, int points, const ForceLaw& law);
+  ToolModel(const Tool& tool, double pitch_mm, double wear, const ForceLaw& law);
 };
 
 }  // namespace osteon::haptic

@@ -44,11 +44,15 @@ LoopParams loop_params(const DeviceLimits& limits, const ForceScaling& scaling) 
 HapticLoop::HapticLoop(const LoopParams& params, std::vector<ToolModel> tools)
     : params_(params),
       tools_(std::move(tools)),
+      ready_(tools_.size()),
       ledger_(EnergyParams{.dt_s = params.dt_s, .turn_arm_mm = Proxy::kTurnArm_mm}),
       guide_pull_(guide_pull_params(params.device_n_per_mm, params.continuous_n, params.dt_s)),
       turn_arm_mm_(params.peak_nmm > 0.0 ? Proxy::kTurnArm_mm : 0.0) {
   effects_.reserve(tools_.size());
-  for (const ToolModel& model : tools_) effects_.emplace_back(model.tool, model.wear);
+  for (std::size_t i = 0; i < tools_.size(); ++i) {
+    effects_.emplace_back(tools_[i].tool, tools_[i].wear);
+    ready_[i] = tools_[i].has_points();
+  }
 }
 
 void HapticLoop::take_up(int tool, const Pose& pose_rest_tool, const WorkspaceMapping& mapping) noexcept {
@@ -380,9 +384,20 @@ Vec3 HapticLoop::cue_n(const LoopReport& report, double limit_n, bool safe) noex
   return to_device(now_n * report.pose_bone_proxy.direction(Vec3::UnitZ()));
 }
 
+void HapticLoop::prepare(int tool) {
+  const auto index = static_cast<std::size_t>(tool);
+  const MutexLock lock(preparing_);
+  if (ready(tool)) return;
+  tools_[index].make_points();
+  if (!touch_points_.empty()) touch_points_[index].emplace(tools_[index].tool);
+  ready_[index].store(true, std::memory_order_release);
+}
+
 void HapticLoop::feel_partners() {
-  touch_points_.clear();
-  for (const ToolModel& model : tools_) touch_points_.emplace_back(model.tool);
+  const MutexLock lock(preparing_);
+  touch_points_.resize(tools_.size());
+  for (std::size_t i = 0; i < tools_.size(); ++i)
+    if (ready_[i]) touch_points_[i].emplace(tools_[i].tool);
 }
 
 HapticLoop::Left HapticLoop::meet(const LoopInput& input, const Left& left, LoopReport& report) noexcept {
@@ -400,7 +415,7 @@ HapticLoop::Left HapticLoop::meet(const LoopInput& input, const Left& left, Loop
   for (const PartnerTool& partner : partners_)
     if (count < others.size() && !restrictions.taken_by && partner.author != restrictions.guide.value)
       others[count++] = partner;
-  const PartnerForce felt = partner_contact_.step(touch_points_[static_cast<std::size_t>(tool_)],
+  const PartnerForce felt = partner_contact_.step(*touch_points_[static_cast<std::size_t>(tool_)],
                                                   report.pose_bone_proxy, std::span(others).first(count), params_.dt_s);
   if (felt.author != 0) report.events |= kPartnerTouched;
   Vec3 wanted_n = to_device(clamped(params_.force_scale * params_.compression.of(felt.force_n), left.room_n));

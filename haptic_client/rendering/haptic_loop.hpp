@@ -2,13 +2,16 @@
 // or allocation. The caller gives time by calling it.
 #pragma once
 #include <array>
+#include <atomic>
 #include <bit>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
 #include "common/core/id.hpp"
+#include "common/core/mutex.hpp"
 #include "common/mechanics/cutting_state.hpp"
 #include "common/mechanics/spindle.hpp"
 #include "common/runtime/spsc_queue.hpp"
@@ -172,9 +175,14 @@ struct LoopReport {
 
 class HapticLoop {
  public:
-  // `tools`: every tool of the session, ready. An index in this list names a tool.
+  // `tools`: every tool of the session. An index in this list names a tool. Models may lack their points.
   HapticLoop(const LoopParams& params, std::vector<ToolModel> tools);
-
+  // Makes the points of a tool that lacks them, in up to 0.4 s. Any thread but the haptic one, also during ticks.
+  void prepare(int tool) OSTEON_EXCLUDES(preparing_);
+  // Any thread. Only a tool that is ready may be taken up.
+  [[nodiscard]] bool ready(int tool) const noexcept {
+    return ready_[static_cast<std::size_t>(tool)].load(std::memory_order_acquire);
+  }
   // [haptic] Takes up a tool in free air, with the handle at a position of the device. The pose is relative to the bone
   // at rest.
   void take_up(int tool, const Pose& pose_rest_tool, const WorkspaceMapping& mapping) noexcept;
@@ -185,9 +193,8 @@ class HapticLoop {
   // Pose of the bone on its mount, relative to its rest pose, which is in its own frame. Without a call the bone is at
   // rest. The mapping belongs to the rest pose. Contact, forces and poses in reports follow the bone.
   void see_bone(const Pose& pose_rest_bone) noexcept;
-  // From now on others' tools are felt. Call before the first tick, off the haptic thread: it makes points of every
-  // tool.
-  void feel_partners();
+  // From now on others' tools are felt. Call before the first tick, off the haptic thread: it makes points.
+  void feel_partners() OSTEON_EXCLUDES(preparing_);
   // [haptic] Poses of others' tools; must stay valid through the next tick. The person who guides this hand or holds
   // its tool is not felt.
   void see_partners(std::span<const PartnerTool> partners) noexcept { partners_ = partners; }
@@ -248,8 +255,10 @@ class HapticLoop {
   static constexpr int kQuietTicks = 20;  // a path ends when the tool has been off the bone for so long
 
   LoopParams params_;
-  std::vector<ToolModel> tools_;         // set_wear() and set_law() change them
-  std::vector<CuttingEffects> effects_;  // of each tool
+  std::vector<ToolModel> tools_;          // set_wear() and set_law() change them
+  std::vector<CuttingEffects> effects_;   // of each tool
+  std::vector<std::atomic<bool>> ready_;  // of each tool: its points are there, and no thread writes them any more
+  Mutex preparing_{LockRank::leaf};
   SpscQueue<CutPiece, 64> pieces_;
   WorkspaceMapping mapping_;
   Proxy proxy_;
@@ -269,7 +278,7 @@ class HapticLoop {
   SupervisionGuard guard_;
   GuidanceSpring guide_pull_;
   GuideSeen guide_seen_;
-  std::vector<TouchPoints> touch_points_;  // of each tool; empty: partners are not felt
+  std::vector<std::optional<TouchPoints>> touch_points_;  // of each tool that is ready; empty: partners are not felt
   PartnerContact partner_contact_;
   std::span<const PartnerTool> partners_;
   Vec3 partner_n_ = Vec3::Zero();   // shown in the last tick, device frame

@@ -11,6 +11,7 @@ namespace osteon::haptic {
 PlayedPointerSession::PlayedPointerSession(ReadyPlan plan, RecordedDevice& device, const ForceScaling& scaling,
                                            double dt_s)
     : plan_(std::move(plan)), device_(device), loop_(pointer_loop(device.limits(), scaling, dt_s), plan_.tools) {
+  for (const RecordedTakeUp& taken : device.session().take_ups) loop_.prepare(taken.tool);
   const Pose start = pointer_start(plan_);
   WorkspaceMapping mapping;
   mapping.align(Eigen::Quaterniond::Identity(), 1.0, start.position_mm, start.position_mm);

@@ -1,7 +1,5 @@
 #include "haptic_client/simulation/pointer_session.hpp"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cmath>
 #include <optional>
@@ -46,17 +44,11 @@ Result<ReadyPlan> make_pointed_hand(const FreeHandOptions& first, const Case& bo
   };
   Result<ReadyPlan> ready = make_free_hand(first, bone, find);
   if (!ready) return ready;
-  // The points of a tool take up to 0.2 s, and a person waits for those of all tools.
-  std::vector<std::optional<Result<ToolModel>>> models(tools.size());
-  tbb::parallel_for(std::size_t{0}, tools.size(), [&](std::size_t i) {
-    if (tools[i].name != first.tool && check_held(tools[i]))
-      models[i].emplace(ToolModel::make(tools[i], bone.pitch_mm(), 1.0, ""));
-  });
-  for (std::size_t i = 0; i < tools.size(); ++i) {
-    if (!models[i]) continue;
-    Result<ToolModel>& model = *models[i];
+  for (const Tool& tool : tools) {
+    if (tool.name == first.tool || !check_held(tool)) continue;
+    Result<ToolModel> model = ToolModel::make(tool, bone.pitch_mm(), 1.0, "", ToolPoints::later);
     if (!model) return tl::unexpected(model.error());
-    model->spindle.full_rpm = std::max(1.0, tools[i].spindle_rpm);
+    model->spindle.full_rpm = std::max(1.0, tool.spindle_rpm);
     ready->tools.push_back(std::move(*model));
   }
   return ready;
@@ -71,6 +63,29 @@ LoopParams pointer_loop(const DeviceLimits& limits, const ForceScaling& scaling,
 Pose pointer_start(const ReadyPlan& plan) {
   const ReadyStep& step = plan.steps[0];
   return {step.site.entry_mm - step.stand_off_mm * step.site.axis, pose_along(Vec3::Zero(), step.site.axis).rotation};
+}
+
+void WantedTool::want(int tool) {
+  const MutexLock lock(mutex_);
+  wanted_ = tool;
+  changed_.notify_one();
+}
+
+std::optional<int> WantedTool::wait() {
+  MutexLock lock(mutex_);
+  while (open_ && !wanted_) changed_.wait(lock);
+  return open_ ? std::exchange(wanted_, std::nullopt) : std::nullopt;
+}
+
+void WantedTool::open() {
+  const MutexLock lock(mutex_);
+  open_ = true;
+}
+
+void WantedTool::close() {
+  const MutexLock lock(mutex_);
+  open_ = false;
+  changed_.notify_one();
 }
 
 PointerSession::PointerSession(ReadyPlan plan, PointerExchange& exchange, const SimulatedDeviceParams& device,
@@ -89,6 +104,15 @@ PointerSession::PointerSession(ReadyPlan plan, PointerExchange& exchange, const 
   WorkspaceMapping mapping;
   mapping.align(Eigen::Quaterniond::Identity(), 1.0, hand_.target_mm, hand_.target_mm);
   loop_.take_up(held_, {hand_.target_mm, rotation_}, mapping);
+  exchange_.wanted.open();
+  maker_ = std::thread([this] {
+    while (const std::optional<int> tool = exchange_.wanted.wait()) loop_.prepare(*tool);
+  });
+}
+
+PointerSession::~PointerSession() {
+  exchange_.wanted.close();
+  maker_.join();
 }
 
 void PointerSession::enter(PointerPhase phase) noexcept {
@@ -208,7 +232,8 @@ bool PointerSession::gave_way() noexcept {
 }
 
 void PointerSession::act(const Patch& patch, double dt_s, SurgeonOrder& order) noexcept {
-  const bool there = command_.on_bone && !silent();
+  // Until a tool is made, the hand holds the one that it has, off the bone.
+  const bool there = command_.on_bone && !silent() && loop_.ready(command_.tool);
   if (!taken_up_) {
     if (there) take_up(order), enter(PointerPhase::over);
     return;

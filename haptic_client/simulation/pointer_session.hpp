@@ -5,8 +5,10 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <thread>
 #include <vector>
 
+#include "common/core/mutex.hpp"
 #include "common/input/pointer_link.hpp"
 #include "common/runtime/triple_buffer.hpp"
 #include "haptic_client/simulation/free_hand.hpp"
@@ -42,14 +44,30 @@ struct PointerState {
   const ForceLaw* law = nullptr;  // of that tool
 };
 
-// Between the thread that reads the pointer and the haptic thread.
+// The tool that the pointer wants, for the thread that makes it ready. Not for the haptic thread.
+class WantedTool {
+ public:
+  void want(int tool);                      // index in the plan's tools
+  [[nodiscard]] std::optional<int> wait();  // for a tool that is wanted now; none: closed
+  void open();
+  void close();
+
+ private:
+  Mutex mutex_{LockRank::leaf};
+  CondVar changed_;
+  std::optional<int> wanted_ OSTEON_GUARDED_BY(mutex_);
+  bool open_ OSTEON_GUARDED_BY(mutex_) = false;
+};
+
+// Between the thread that reads the pointer and those of the session.
 struct PointerExchange {
   TripleBuffer<PointerCommand> commands;  // pointer → haptic
   TripleBuffer<PointerState> states;      // haptic → pointer
+  WantedTool wanted;                      // pointer → the thread that makes tools ready
 };
 
 // A plan of one endless step with all of `tools` that a hand can hold. `first`: the tool that is held first, its law
-// and wear. Error invalid_input or not_found.
+// and wear. It is ready; the models of the others have no points yet. Error invalid_input or not_found.
 [[nodiscard]] Result<ReadyPlan> make_pointed_hand(const FreeHandOptions& first, const Case& bone,
                                                   const std::vector<Tool>& tools);
 
@@ -72,6 +90,7 @@ class PointerSession final : public Session {
   // `plan`: from make_pointed_hand(). `exchange` outlives the session.
   PointerSession(ReadyPlan plan, PointerExchange& exchange, const SimulatedDeviceParams& device,
                  const ForceScaling& scaling, double dt_s = 1e-3);
+  ~PointerSession() override;
 
   // [haptic] Time is counted in these ticks.
   SessionTick tick(const Patch& patch, RoomLink room, int periods = 1,
@@ -133,6 +152,7 @@ class PointerSession final : public Session {
   double react_s_ = 0;
   std::vector<StepResult> results_{1};
   std::vector<PlacedItem> left_;
+  std::thread maker_;  // makes wanted tools ready; last: it uses the other members
 };
 
 }  // namespace osteon::haptic

@@ -146,6 +146,7 @@ Session record_pointer(const Case& bone, const std::filesystem::path& file, std:
   const SimulatedDeviceParams device{"pointer", SimulatedDeviceParams{}.limits};
   auto made = std::make_unique<PointerSession>(pointed(bone), exchange, device, 0.0);
   PointerSession& hand = *made;
+  hand.loop().prepare(1);
   Bench bench(bone, std::move(made));
   Result<RecordFile> recording = RecordFile::create(file, info_of(hand));
   EXPECT_TRUE(recording) << recording.error().message;

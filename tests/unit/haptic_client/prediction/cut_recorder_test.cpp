@@ -20,6 +20,27 @@ TEST(ToolModel, CutsNoFinerThanTheCase) {
   EXPECT_LT(ToolModel(tool, 0.15).cut_level, tool.cut_level);
 }
 
+TEST(ToolModel, HasTheSamePointsWhetherTheyAreMadeNowOrLater) {
+  for (const char* name : {"drill-3.2", "saw-oscillating-1", "broach-1", "burr-round-5"}) {
+    SCOPED_TRACE(name);
+    const Tool tool = *find_tool(name);
+    const ToolModel now(tool, 0.5);
+    ToolModel later = *ToolModel::make(tool, 0.5, 1.0, "", ToolPoints::later);
+    EXPECT_FALSE(later.has_points());
+    EXPECT_TRUE(later.active.empty() && later.passive.empty());
+    later.make_points();
+    ASSERT_TRUE(later.has_points());
+    ASSERT_EQ(later.active.size(), now.active.size());
+    ASSERT_EQ(later.passive.size(), now.passive.size());
+    EXPECT_EQ(later.active_area_mm2, now.active_area_mm2);
+    EXPECT_EQ(later.strength, now.strength);
+    for (std::size_t i = 0; i < now.active.size(); ++i) {
+      EXPECT_EQ(later.active[i].surface_mm, now.active[i].surface_mm) << i;
+      EXPECT_EQ(later.active[i].edge, now.active[i].edge) << i;
+    }
+  }
+}
+
 TEST(CutRecorder, KeepsACornerAndDropsWhatIsStraight) {
   CutRecorder recorder;
   recorder.begin({}, 5.0);

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <numbers>
@@ -13,6 +14,7 @@
 #include "common/core/check.hpp"
 #include "tests/support/allocation_counter.hpp"
 #include "tests/support/trials.hpp"
+#include "tests/support/wait.hpp"
 #include "tests/unit/haptic_client/bench.hpp"
 
 namespace osteon::haptic::test {
@@ -37,7 +39,6 @@ class PointedHand : public ::testing::Test {
     command_.tool = tool_named(tool);
     command_.number = number_;
   }
-  // Making the models of all tools takes seconds, so all tests share them.
   static const ReadyPlan& plan() {
     static const ReadyPlan made = [] {
       const FreeHandOptions options{.tool = "drill-3.2", .toward = Vec3::UnitZ(), .at_mm = kAt_mm};
@@ -55,7 +56,9 @@ class PointedHand : public ::testing::Test {
     return static_cast<int>(found - tools.begin());
   }
   static Eigen::Quaterniond along(const Vec3& axis) { return pose_along(Vec3::Zero(), axis).rotation; }
+  // On virtual time nobody waits for a thread that makes tools.
   void send() {
+    session_->loop().prepare(command_.tool);
     command_.number = ++number_;
     exchange_.commands.store(command_);
   }
@@ -652,6 +655,34 @@ class WildPointer {
   std::mt19937 random_;
   int next_ = 0;
 };
+
+// Points of tools take long, so each is made when the pointer first wants it, while the hand ticks on.
+TEST_F(PointedHand, WaitsOffTheBoneForAToolThatIsBeingMade) {
+  begin();
+  run(1500);
+  ASSERT_EQ(phase(), PointerPhase::rests);
+  const int burr = tool_named("burr-round-5");
+  ASSERT_FALSE(session_->loop().ready(burr));
+  command_.tool = burr;
+  command_.push = true;
+  command_.number = ++number_;
+  exchange_.commands.store(command_);
+  sends_ = false;
+  run(60);
+  EXPECT_EQ(phase(), PointerPhase::away);
+  EXPECT_FALSE(session_->loop().ready(burr));
+  EXPECT_EQ(removed(), 0.0);
+
+  exchange_.wanted.want(burr);
+  EXPECT_TRUE(osteon::test::wait_until([&] { return session_->loop().ready(burr); }, std::chrono::seconds(10)));
+  sends_ = true;
+  command_.push = false;
+  const SessionTick last = run(1500);
+  EXPECT_EQ(phase(), PointerPhase::rests);
+  EXPECT_EQ(last.report.tool, burr);
+  press(1000);
+  EXPECT_GT(removed(), 0.0);
+}
 
 TEST_F(PointedHand, StaysPassiveUnderJumpsStallsAndRandomPushes) {
   // A million ticks in deploy/nightly. Else 40'000, in which the pointer changes about 160 times.
