@@ -39,6 +39,7 @@ constexpr std::array kCalls{
     CallRow{"/osteon.v1.PeopleService/Supervise", kInstructor},
     CallRow{"/osteon.v1.PeopleService/Annotate", kInstructor},
     CallRow{"/osteon.v1.PeopleService/Say", kCutters},
+    CallRow{"/osteon.v1.PeopleService/ShareShots", kCutters},
     CallRow{"/osteon.v1.PeopleService/Demonstrate", kInstructor},
     CallRow{"/osteon.v1.PeopleService/EndDemonstration", kInstructor},
     CallRow{"/osteon.v1.RoomsService/ListRooms", kInstructorOrOperator},
@@ -57,8 +58,8 @@ constexpr std::array kCalls{
 // In the order of the enumerations.
 constexpr std::array<RoleSet, kDatagrams> kCarried{kCutters, kCutters, kCutters, kCutters,
                                                    kCutters, kCutters, kCutters, kCutters};
-constexpr std::array<RoleSet, kStreamContents> kContents{kInRoom, kInRoom,     kInRoom, kInRoom,    kInRoom,
-                                                         kInRoom, kInstructor, kInRoom, kInstructor};
+constexpr std::array<RoleSet, kStreamContents> kContents{kInRoom, kInRoom,     kInRoom, kInRoom,     kInRoom,
+                                                         kInRoom, kInstructor, kInRoom, kInstructor, kInRoom};
 constexpr std::array<RoleSet, kRights> kGranted{kCutters, kCutters, kPartners, kInstructor};
 
 }  // namespace

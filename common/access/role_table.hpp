@@ -60,8 +60,9 @@ enum class StreamContent : std::uint8_t {
   others_supervision,  // decisions about others
   own_words,           // messages to all, to the reader or from the reader
   others_words,        // messages between others
+  shots,               // of everyone's C-arm
 };
-inline constexpr int kStreamContents = 9;
+inline constexpr int kStreamContents = 10;
 [[nodiscard]] bool may_receive(Role role, StreamContent content);
 
 // Rights that the name of a call does not determine.

@@ -23,6 +23,41 @@ bool is_up(const Vec3& up, const Vec3& sight) {
          up.cross(sight).norm() > kLeastAcross * sight.norm();
 }
 
+v1::CArmShot shot_to_wire(const CArmShot& shot) {
+  v1::CArmShot out;
+  out.set_number(shot.number);
+  out.set_time_unix_ms(shot.time_unix_ms);
+  out.set_mode(static_cast<v1::ShotMode>(static_cast<int>(shot.mode) + 1));  // 0 is none
+  *out.mutable_isocentre_mm() = to_wire(shot.position.isocentre_mm);
+  out.set_orbit_rad(shot.position.orbit_rad);
+  out.set_tilt_rad(shot.position.tilt_rad);
+  *out.mutable_translation_mm() = to_wire(shot.position.translation_mm);
+  out.set_exposure_s(shot.exposure_s);
+  out.set_air_kerma_at_metre_ugy(shot.air_kerma_at_metre_ugy);
+  out.set_dose_area_gy_cm2(shot.dose_area_gy_cm2);
+  out.set_seed(shot.seed);
+  return out;
+}
+
+// All but the limits of its numbers is checked.
+Result<CArmShot> shot_from_wire(const v1::CArmShot& shot) {
+  if (shot.mode() < v1::SHOT_MODE_SINGLE || shot.mode() > v1::SHOT_MODE_LIVE)
+    return bad_field("shot.mode", "must be single, pulse or live");
+  CArmShot out;
+  out.number = shot.number();
+  out.time_unix_ms = shot.time_unix_ms();
+  out.mode = static_cast<ShotMode>(shot.mode() - 1);
+  out.position.isocentre_mm = from_wire(shot.isocentre_mm());
+  out.position.orbit_rad = shot.orbit_rad();
+  out.position.tilt_rad = shot.tilt_rad();
+  out.position.translation_mm = from_wire(shot.translation_mm());
+  out.exposure_s = shot.exposure_s();
+  out.air_kerma_at_metre_ugy = shot.air_kerma_at_metre_ugy();
+  out.dose_area_gy_cm2 = shot.dose_area_gy_cm2();
+  out.seed = shot.seed();
+  return out;
+}
+
 }  // namespace
 
 v1::Vector3 to_wire(const Vec3& v) {
@@ -429,6 +464,37 @@ Result<Annotation> from_wire(const v1::Annotation& annotation) {
     out.points.push_back({annotation.points(i), annotation.points(i + 1), annotation.points(i + 2)});
   out.words = annotation.words();
   out.colour = annotation.colour();
+  if (const Result<void> sound = check(out); !sound) return tl::unexpected(sound.error());
+  return out;
+}
+
+v1::ShotRun to_wire(const ShotRun& run) {
+  v1::ShotRun out;
+  out.set_author(run.author.value);
+  out.set_first_number(run.first_number);
+  out.set_exposure_s(run.exposure_s);
+  *out.mutable_last() = shot_to_wire(run.last);
+  return out;
+}
+
+Result<ShotRun> from_wire(const v1::ShotRun& run) {
+  const Result<CArmShot> last = shot_from_wire(run.last());
+  if (!last) return tl::unexpected(last.error());
+  ShotRun out{AuthorId{run.author()}, run.first_number(), run.exposure_s(), *last};
+  if (const Result<void> sound = check(out); !sound) return tl::unexpected(sound.error());
+  return out;
+}
+
+v1::ShotTotals to_wire(const ShotTotals& totals) {
+  v1::ShotTotals out;
+  out.set_shots(totals.shots);
+  out.set_exposure_s(totals.exposure_s);
+  out.set_dose_area_gy_cm2(totals.dose_area_gy_cm2);
+  return out;
+}
+
+Result<ShotTotals> from_wire(const v1::ShotTotals& totals) {
+  const ShotTotals out{totals.shots(), totals.exposure_s(), totals.dose_area_gy_cm2()};
   if (const Result<void> sound = check(out); !sound) return tl::unexpected(sound.error());
   return out;
 }

@@ -10,6 +10,7 @@
 #include "common/mechanics/cutting_state.hpp"
 #include "common/surface/view_frustum.hpp"
 #include "common/tools/annotation.hpp"
+#include "common/tools/c_arm_shot.hpp"
 #include "common/tools/placing.hpp"
 #include "common/wire/version.hpp"
 #include "osteon/v1/cutting.pb.h"
@@ -32,6 +33,8 @@ namespace osteon::wire {
 [[nodiscard]] v1::ViewFrustum to_wire(const ViewFrustum& look);
 [[nodiscard]] v1::Restrictions to_wire(const Restrictions& supervision);
 [[nodiscard]] v1::Annotation to_wire(const Annotation& annotation);
+[[nodiscard]] v1::ShotRun to_wire(const ShotRun& run);
+[[nodiscard]] v1::ShotTotals to_wire(const ShotTotals& totals);
 [[nodiscard]] std::string to_wire(const Digest& digest);
 [[nodiscard]] v1::RejectionReason to_wire(Rejection reason);
 
@@ -49,6 +52,8 @@ namespace osteon::wire {
 // checked by check(); tools in any order
 [[nodiscard]] Result<Restrictions> from_wire(const v1::Restrictions& supervision);
 [[nodiscard]] Result<Annotation> from_wire(const v1::Annotation& annotation);  // checked by check()
+[[nodiscard]] Result<ShotRun> from_wire(const v1::ShotRun& run);               // checked by check()
+[[nodiscard]] Result<ShotTotals> from_wire(const v1::ShotTotals& totals);      // checked by check()
 [[nodiscard]] Result<Digest> digest_from_wire(const std::string& bytes);
 // Rejection::none for a reason that this version does not know.
 [[nodiscard]] Rejection from_wire(v1::RejectionReason reason);

@@ -13,6 +13,8 @@ constexpr CallRate kComing{4.0, 60.0};
 constexpr CallRate kSaying{5.0, 40.0};
 // The same, for calls in quick succession, as when a tool is dragged or a script runs.
 constexpr CallRate kChanging{20.0, 100.0};
+// Each goes to everybody in the room, and to no journal. A window sends four a second.
+constexpr CallRate kShooting{8.0, 40.0};
 // Each copies all leaves of the bone.
 constexpr CallRate kCopying{1.0, 10.0};
 // Needs the bone, and is what programs ask again and again while they wait.
@@ -35,6 +37,7 @@ constexpr std::array kRates{
     Row{"/osteon.v1.RoomService/GetCase", kComing},        Row{"/osteon.v1.RoomsService/BranchRoom", kSaying},
     Row{"/osteon.v1.RoomsService/ReplayRoom", kSaying},    Row{"/osteon.v1.PlanService/GetPlan", kComing},
     Row{"/osteon.v1.PlanService/GetDensity", kComing},     Row{"/osteon.v1.FieldService/WatchField", kCopying},
+    Row{"/osteon.v1.PeopleService/ShareShots", kShooting},
 };
 
 }  // namespace

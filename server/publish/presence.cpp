@@ -93,6 +93,19 @@ void Presence::looked(AuthorId author, const ViewFrustum& from) {
   if (Entry* entry = change(author)) entry->look = from;
 }
 
+void Presence::shot(AuthorId author, ShotRun run, const ShotTotals& session) {
+  const MutexLock lock(mutex_);
+  run.author = author;
+  const auto known = std::ranges::find_if(runs_, [&](const RunEntry& entry) { return same_press(entry.run, run); });
+  if (known != runs_.end() && known->run.last.number > run.last.number) return;
+  Entry* entry = change(author);
+  if (entry == nullptr) return;
+  entry->shots = session;
+  if (known != runs_.end()) runs_.erase(known);
+  runs_.push_back({++runs_told_, std::move(run)});
+  if (runs_.size() > kMostRuns) runs_.pop_front();
+}
+
 std::vector<AuthorId> Presence::supervised_hands() const {
   const MutexLock lock(mutex_);
   std::vector<AuthorId> hands;
@@ -179,6 +192,7 @@ Bytes Presence::news(PresenceCursor& cursor, AuthorId reader, const PeopleRights
     person.set_here(entry.streams > 0);
     person.set_hand(entry.hand);
     person.set_session_cuts(entry.cuts);
+    if (rights.shots && entry.shots.shots > 0) *person.mutable_session_shots() = wire::to_wire(entry.shots);
     if (entry.look) *person.mutable_look() = wire::to_wire(*entry.look);
     if (!(is_readers(author) ? rights.own_supervision : rights.others_supervision)) continue;
     if (entry.decided) *person.mutable_supervision() = wire::to_wire(entry.supervision);
@@ -202,11 +216,13 @@ Bytes Presence::news(PresenceCursor& cursor, AuthorId reader, const PeopleRights
     words.set_to(said.to.value);
     words.set_words(said.words);
   }
+  for (const RunEntry& told : runs_)
+    if (rights.shots && told.number > cursor.runs) *out.add_shots() = wire::to_wire(told.run);
   out.set_room_seq(room_seq_.value);
   out.set_complete(!cursor.begun);
-  const bool nothing =
-      cursor.begun && out.people().empty() && out.annotations().empty() && out.wiped().empty() && out.words().empty();
-  cursor = {revision_, words_said_, std::move(drawn), true};
+  const bool nothing = cursor.begun && out.people().empty() && out.annotations().empty() && out.wiped().empty() &&
+                       out.words().empty() && out.shots().empty();
+  cursor = {revision_, words_said_, runs_told_, std::move(drawn), true};
   return nothing ? nullptr : serialised(out);
 }
 

@@ -1,5 +1,5 @@
-// Knows who is in a room, what was decided about whom, what is drawn, and the latest messages. WatchPeople sends this
-// to each reader, as far as the reader's role allows.
+// Knows who is in a room, what was decided about whom, what is drawn, the latest messages, and the latest shots of
+// everybody's C-arm. WatchPeople sends this to each reader, as far as the reader's role allows.
 #pragma once
 #include <chrono>
 #include <cstdint>
@@ -14,6 +14,7 @@
 #include "common/core/id.hpp"
 #include "common/core/mutex.hpp"
 #include "common/surface/view_frustum.hpp"
+#include "common/tools/c_arm_shot.hpp"
 #include "server/publish/send_queue.hpp"
 #include "server/publish/subscriber.hpp"
 #include "server/room/room.hpp"
@@ -27,7 +28,7 @@ class PresenceSubscriber : public Subscriber {
 
 // How much a reader has received.
 struct PresenceCursor {
-  std::uint64_t revision = 0, words = 0;
+  std::uint64_t revision = 0, words = 0, runs = 0;
   std::set<std::uint32_t> annotations;
   bool begun = false;
 };
@@ -36,7 +37,7 @@ struct PresenceCursor {
 // one person.
 struct PeopleRights {
   bool people = true, drawings = true, own_supervision = true, others_supervision = true, own_words = true,
-       others_words = true;
+       others_words = true, shots = true;
 };
 
 // Any thread may call it.
@@ -44,6 +45,7 @@ class Presence {
  public:
   using Clock = std::chrono::steady_clock;
   static constexpr std::size_t kMostWords = 64;    // the latest ones
+  static constexpr std::size_t kMostRuns = 64;     // of shots; the latest ones
   static constexpr std::size_t kMostAbsent = 256;  // people who have left; the latest ones
   static constexpr std::chrono::milliseconds kApart{100};
 
@@ -57,6 +59,9 @@ class Presence {
   void took_cut(AuthorId author);
   void acknowledged(AuthorId author, RoomSeq seq);
   void looked(AuthorId author, const ViewFrustum& from);
+  // The newest press of the author's C-arm, so far. It takes the place of what was known of this press. What is older
+  // than that is ignored, and so is an unknown author.
+  void shot(AuthorId author, ShotRun run, const ShotTotals& session);
 
   // People with a tool, present or not, who may be supervised together. Instructors are not among them.
   [[nodiscard]] std::vector<AuthorId> supervised_hands() const;
@@ -71,8 +76,8 @@ class Presence {
   // [tick] Notifies readers at most once every kApart.
   void publish(RoomSeq room_seq, Clock::time_point now);
 
-  // A whole WatchPeopleResponse with what the reader lacks; null: nothing. Contains the newest state of each person and
-  // annotation, and the messages that are still stored.
+  // A whole WatchPeopleResponse with what the reader lacks; null: nothing. Contains the newest state of each person,
+  // annotation and press of a pedal, and the messages that are still stored.
   [[nodiscard]] Bytes news(PresenceCursor& cursor, AuthorId reader, const PeopleRights& rights) const;
 
  private:
@@ -87,6 +92,7 @@ class Presence {
     AuthorId decided_by;
     std::optional<ViewFrustum> look;
     std::uint32_t cuts = 0;
+    ShotTotals shots;
     std::uint64_t last_here = 0;  // revision
   };
   struct Drawn {
@@ -98,6 +104,10 @@ class Presence {
     RoomSeq seq;
     AuthorId from, to;
     std::string words;
+  };
+  struct RunEntry {
+    std::uint64_t number = 0;
+    ShotRun run;
   };
   Entry* change(AuthorId author) OSTEON_REQUIRES(mutex_);  // null: unknown author
 
@@ -112,6 +122,8 @@ class Presence {
   std::map<std::uint32_t, Drawn> annotations_ OSTEON_GUARDED_BY(mutex_);
   std::deque<ChatEntry> words_ OSTEON_GUARDED_BY(mutex_);
   std::uint64_t words_said_ OSTEON_GUARDED_BY(mutex_) = 0;
+  std::deque<RunEntry> runs_ OSTEON_GUARDED_BY(mutex_);
+  std::uint64_t runs_told_ OSTEON_GUARDED_BY(mutex_) = 0;
   RoomSeq room_seq_ OSTEON_GUARDED_BY(mutex_);
 };
 

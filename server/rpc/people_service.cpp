@@ -1,4 +1,4 @@
-// The service for the people of a room: who is there, and what they decide about each other, draw, say and show.
+// The service for the people of a room: who is there, and what they decide about each other, draw, say, shoot and show.
 #include <grpcpp/grpcpp.h>
 
 #include <algorithm>
@@ -41,7 +41,8 @@ class PeopleStream final : public OutStream<WriteReactor>, public PresenceSubscr
                               .own_supervision = may_receive(StreamContent::own_supervision),
                               .others_supervision = may_receive(StreamContent::others_supervision),
                               .own_words = may_receive(StreamContent::own_words),
-                              .others_words = may_receive(StreamContent::others_words)};
+                              .others_words = may_receive(StreamContent::others_words),
+                              .shots = may_receive(StreamContent::shots)};
     const Bytes news = room_->runtime().people().news(cursor_, author_, rights);
     if (news) message = buffer_of({news});
     return news != nullptr;
@@ -58,10 +59,10 @@ class PeopleStream final : public OutStream<WriteReactor>, public PresenceSubscr
   PresenceCursor cursor_ OSTEON_GUARDED_BY(mutex_);
 };
 
-using PeopleBase = v1::PeopleService::WithRawCallbackMethod_WatchPeople<
-    v1::PeopleService::WithCallbackMethod_Supervise<v1::PeopleService::WithCallbackMethod_Annotate<
-        v1::PeopleService::WithCallbackMethod_Say<v1::PeopleService::WithCallbackMethod_Demonstrate<
-            v1::PeopleService::WithCallbackMethod_EndDemonstration<v1::PeopleService::Service>>>>>>;
+using PeopleBase = v1::PeopleService::WithRawCallbackMethod_WatchPeople<v1::PeopleService::WithCallbackMethod_Supervise<
+    v1::PeopleService::WithCallbackMethod_Annotate<v1::PeopleService::WithCallbackMethod_Say<
+        v1::PeopleService::WithCallbackMethod_ShareShots<v1::PeopleService::WithCallbackMethod_Demonstrate<
+            v1::PeopleService::WithCallbackMethod_EndDemonstration<v1::PeopleService::Service>>>>>>>;
 
 class PeopleServiceImpl final : public PeopleBase {
  public:
@@ -173,6 +174,22 @@ class PeopleServiceImpl final : public PeopleBase {
           return r.say(by, to, words);
         },
         [response](const RoomEvent& event) { response->set_room_seq(event.room_seq.value); });
+  }
+
+  // No event: it changes nothing in the room, and comes several times a second.
+  grpc::ServerUnaryReactor* ShareShots(grpc::CallbackServerContext* context, const v1::ShareShotsRequest* request,
+                                       v1::ShareShotsResponse*) override {
+    grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
+    if (!admitted<v1::ShareShotsRequest>(rooms_, *context, reactor)) return reactor;
+    const Result<ShotRun> run = wire::from_wire(request->run());
+    if (!run) return refuse(reactor, invalid(run.error().message));
+    const Result<ShotTotals> session = wire::from_wire(request->session());
+    if (!session) return refuse(reactor, invalid(session.error().message));
+    const std::shared_ptr<OpenRoom> room = room_of_member(rooms_, *context, reactor, *request);
+    if (!room) return reactor;
+    room->runtime().people().shot(AuthorId{request->author()}, *run, *session);
+    reactor->Finish(Status::OK);
+    return reactor;
   }
 
   grpc::ServerUnaryReactor* Demonstrate(grpc::CallbackServerContext* context, const v1::DemonstrateRequest* request,

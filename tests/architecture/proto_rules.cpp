@@ -58,9 +58,9 @@ bool needs_unit(const pb::FieldDescriptor* field) {
 
 bool names_unit(const std::string& comment) {
   static const std::regex unit(
-      R"((^|[\s;,(])(mm(\^[23])?|mm/s|s|ms|ns|seconds|microseconds|N|N mm|N/mm|g/cm\^3|HU|radians|hertz|Hz|)"
-      R"(revolutions per minute|steps of \S+( mm)?|samples( of the level)?|blocks|0 to \d+|id|count|number|text|bytes|)"
-      R"(no unit|see there|unit as named by the holder)([\s;,.)]|$))");
+      R"((^|[\s;,(])(mm(\^[23])?|mm/s|s|ms|ns|seconds|microseconds|N|N mm|N/mm|g/cm\^3|HU|uGy|Gy cm\^2|radians|)"
+      R"(hertz|Hz|revolutions per minute|steps of \S+( mm)?|samples( of the level)?|blocks|0 to \d+|id|count|number|)"
+      R"(text|bytes|no unit|see there|unit as named by the holder)([\s;,.)]|$))");
   return std::regex_search(comment, unit);
 }
 

@@ -57,7 +57,8 @@ void note(const Result<Value>& value) {
 void look_through(const Message& message) {
   if (converts<v1::Cut>(message) || converts<v1::CuttingState>(message) || converts<v1::SceneItem>(message) ||
       converts<v1::ToolDefinition>(message) || converts<v1::Restrictions>(message) ||
-      converts<v1::Annotation>(message) || converts<v1::ViewFrustum>(message))
+      converts<v1::Annotation>(message) || converts<v1::ViewFrustum>(message) || converts<v1::ShotRun>(message) ||
+      converts<v1::ShotTotals>(message))
     return;
   if (is<v1::MountLoad>(message)) note(wire::from_wire(static_cast<const v1::MountLoad&>(message)));
   if (is<v1::SetSceneItemRequest>(message))

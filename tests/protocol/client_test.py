@@ -418,6 +418,28 @@ class Watching(Case):
         self.session.send(cutting.SessionRequest(acknowledged=cutting.Acknowledgement(room_seq=decided.room_seq)))
         self.until(messages, lambda m: any(p.acknowledged_room_seq >= decided.room_seq for p in m.people))
 
+    def test_the_shots_of_others(self):
+        stub = people_grpc.PeopleServiceStub(self.hand.channel)
+        shot = types.CArmShot(number=4, time_unix_ms=1796050000123, mode=types.SHOT_MODE_LIVE,
+                              isocentre_mm=types.Vector3(x=1, y=2, z=-5), orbit_rad=0.1, exposure_s=1 / 15,
+                              air_kerma_at_metre_ugy=2.5, dose_area_gy_cm2=0.0017, seed=2**64 - 1)
+        run = types.ShotRun(first_number=3, exposure_s=2 / 15, last=shot)
+        counts = types.ShotTotals(shots=4, exposure_s=0.2, dose_area_gy_cm2=0.005)
+        stub.ShareShots(people.ShareShotsRequest(author=self.hand.author, run=run, session=counts), timeout=20)
+        console = self.member(CONSOLE, "ada")
+        messages = self.messages_of(people_grpc.PeopleServiceStub(console.channel).WatchPeople(
+            people.WatchPeopleRequest(author=console.author), timeout=60))
+        run.author = self.hand.author
+        first = messages.get(timeout=30)
+        self.assertEqual(list(first.shots), [run])
+        self.assertEqual([p.session_shots for p in first.people if p.author == self.hand.author], [counts])
+        shot.tilt_rad = math.nan
+        with self.assertRaises(grpc.RpcError) as refused:
+            stub.ShareShots(people.ShareShotsRequest(author=self.hand.author, session=counts,
+                                                     run=types.ShotRun(first_number=4, last=shot)), timeout=20)
+        self.assertEqual((refused.exception.code(), refused.exception.details()),
+                         (grpc.StatusCode.INVALID_ARGUMENT, "shot.tilt_rad must be -100 to 100"))
+
     def test_version_3_gets_nothing_that_it_does_not_know(self):
         _, old = self.haptic("ben", version=3)
         stub = people_grpc.PeopleServiceStub(self.hand.channel)

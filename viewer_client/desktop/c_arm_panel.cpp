@@ -15,7 +15,9 @@
 #include <QPainter>
 #include <QPushButton>
 #include <QSlider>
+#include <QStringList>
 #include <QVBoxLayout>
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <string_view>
@@ -68,8 +70,10 @@ class CArmScreen : public QWidget {
     setMinimumSize(least_width, least_width * 3 / 4);
     setSizePolicy(QSizePolicy::Expanding, QSizePolicy::Expanding);
   }
-  void show_picture(const ScreenPicture& picture) {
+  void show_picture(const ScreenPicture& picture, const QString& what) {
     picture_ = picture;
+    what_ = what;
+    if (toolTip() != what) setToolTip(what);
     const EdgeLetters& at = picture.letters;
     const QString name = picture.image.isNull()
                              ? what_
@@ -98,7 +102,7 @@ class CArmScreen : public QWidget {
   }
 
  private:
-  const QString what_;
+  QString what_;
   ScreenPicture picture_;
 };
 
@@ -106,12 +110,13 @@ struct CArmPanel::Mailbox {
   Mutex mutex{LockRank::leaf};
   CArmPanel* panel OSTEON_GUARDED_BY(mutex) = nullptr;  // null: it is gone
 
-  // [inside thread]
-  void post(std::shared_ptr<const CArmPicture> picture) {
+  // `receive` takes it in the GUI thread. [inside thread]
+  using Receive = void (CArmPanel::*)(const std::shared_ptr<const CArmPicture>&);
+  void post(std::shared_ptr<const CArmPicture> picture, Receive receive) {
     const MutexLock lock(mutex);
     if (panel == nullptr) return;
     QMetaObject::invokeMethod(
-        panel, [to = panel, picture = std::move(picture)] { to->receive(picture); }, Qt::QueuedConnection);
+        panel, [to = panel, receive, picture = std::move(picture)] { (to->*receive)(picture); }, Qt::QueuedConnection);
   }
 };
 
@@ -126,13 +131,19 @@ CArmPanel::CArmPanel(InsideLink& inside, Events events, QWidget* parent)
     mailbox_->panel = this;
   }
   setObjectName("c_arm");
-  image_ = std::make_shared<CArmImage>(
-      [to = mailbox_](std::shared_ptr<const CArmPicture> picture) { to->post(std::move(picture)); });
+  const auto image = [this](Mailbox::Receive receive) {
+    return std::make_shared<CArmImage>([to = mailbox_, receive](std::shared_ptr<const CArmPicture> picture) {
+      to->post(std::move(picture), receive);
+    });
+  };
+  image_ = image(&CArmPanel::receive);
+  others_image_ = image(&CArmPanel::receive_others);
   auto* all = new QVBoxLayout(this);
   all->addLayout(make_screens(), 1);
   words_ = new QLabel;
   words_->setObjectName("c_arm_words");
   words_->setWordWrap(true);
+  words_->setTextFormat(Qt::PlainText);  // it has names of people
   all->addWidget(words_);
   all->addLayout(make_pedals());
   all->addLayout(make_views());
@@ -140,10 +151,17 @@ CArmPanel::CArmPanel(InsideLink& inside, Events events, QWidget* parent)
   make_rows(*form);
   make_counters(*form);
   all->addLayout(form);
+  others_ = new OthersShots([this](const std::optional<ShotRun>& run) { show_others(run); });
+  all->addWidget(others_);
   pedal_timer_.setInterval(kPedalPeriod_ms);
   status_timer_.setInterval(kStatusPeriod_ms);
+  share_timer_.setInterval(SharedShots::kApart);
+  connect(&share_timer_, &QTimer::timeout, this, [this] { share(); });
   connect(&pedal_timer_, &QTimer::timeout, this, [this] { tick(); });
-  connect(&status_timer_, &QTimer::timeout, this, [this] { show_status(); });
+  connect(&status_timer_, &QTimer::timeout, this, [this] {
+    take_others();
+    show_status();
+  });
   show_position();
   show_counters();
   show_status();
@@ -151,6 +169,7 @@ CArmPanel::CArmPanel(InsideLink& inside, Events events, QWidget* parent)
 
 CArmPanel::~CArmPanel() {
   inside_.set_visible(image_, false);
+  inside_.set_visible(others_image_, false);
   const MutexLock lock(mailbox_->mutex);
   mailbox_->panel = nullptr;
 }
@@ -181,7 +200,7 @@ QLayout* CArmPanel::make_pedals() {
     connect(held, &QPushButton::pressed, this, [this, mode = mode] { press(mode); });
     connect(held, &QPushButton::released, this, [this] { release(); });
   }
-  save_ = button(tr("Save…"), "c_arm_save", tr("Saves the last picture as a PNG file"));
+  save_ = button(tr("Save…"), "c_arm_save", tr("Saves the picture that is shown as a PNG file"));
   connect(save_, &QPushButton::clicked, this, [this] { choose_file(); });
   return pedals;
 }
@@ -334,17 +353,38 @@ void CArmPanel::show_status() {
   // What is on its way never comes then.
   if (!trouble.isEmpty()) stop();
   const std::optional<InsideStatus> now = inside_.status();
-  const bool behind = now && now->state == InsideState::interrupted;
-  const QString words = !trouble.isEmpty() ? trouble
-                        : behind           ? tr("The connection is lost. Pictures show the bone as it was.")
-                                           : fault_;
+  const QString words = !trouble.isEmpty() ? trouble : now ? words_about(*now) : QString();
   if (words_->text() != words) words_->setText(words);
   words_->setVisible(!words.isEmpty());
   const QString reason = maximum() ? tr("Maximum intensity needs no X-rays. Choose X-ray first.") : trouble;
   for (QPushButton* pedal : {single_, pulse_, live_})
     if (pedal->isEnabled() != reason.isEmpty() || !reason.isEmpty()) set_enabled(*pedal, reason.isEmpty(), reason);
-  const bool any = !(maximum() ? projection_ : shot_).image.isNull();
+  const bool any = !shown().image.isNull();
   if (save_->isEnabled() != any || !any) set_enabled(*save_, any, tr("There is no picture yet."));
+}
+
+QString CArmPanel::words_about(const InsideStatus& now) const {
+  QStringList words;
+  if (others_->shown())
+    words << tr("%1: made again from the bone and the tools as they are now.").arg(others_->title(*others_->shown()));
+  if (now.state == InsideState::interrupted) words << tr("The connection is lost. Pictures show the bone as it was.");
+  if (!fault_.isEmpty()) words << fault_;
+  if (observes_)
+    words << tr("You are an observer: the others do not see your shots.");
+  else if (!not_shared_.isEmpty())
+    words << tr("The others do not see your shots: %1").arg(not_shared_);
+  return words.join(' ');
+}
+
+const ScreenPicture& CArmPanel::shown() const {
+  if (others_->shown()) return others_shot_;
+  return maximum() ? projection_ : shot_;
+}
+
+void CArmPanel::show_screens() {
+  const bool others = others_->shown().has_value();
+  last_->show_picture(shown(), others ? tr("A picture of another person") : tr("The last picture"));
+  before_->show_picture(maximum() || others ? ScreenPicture() : shot_before_, tr("The picture before it"));
 }
 
 void CArmPanel::enter(const Box& bone, const std::filesystem::path& session) {
@@ -372,9 +412,13 @@ void CArmPanel::leave() {
   console_.begin({}, {});
   picture_.reset();
   shot_ = shot_before_ = projection_ = {};
-  last_->show_picture({});
-  before_->show_picture({});
+  shared_.begin();
+  share_timer_.stop();
+  observes_ = false;
+  not_shared_.clear();
+  others_->reset();
   kind_->setCurrentIndex(0);
+  show_screens();
   show_position();
   show_counters();
   show_status();
@@ -390,10 +434,12 @@ bool CArmPanel::maximum() const { return kind_->currentIndex() == 1; }
 
 void CArmPanel::show_maximum() {
   image_->show_maximum(maximum() ? std::optional(console_.position()) : std::nullopt);
-  if (maximum()) release();
+  if (maximum()) {
+    release();
+    others_->choose_own();
+  }
   inside_.wake();
-  last_->show_picture(maximum() ? projection_ : shot_);
-  before_->show_picture(maximum() ? ScreenPicture() : shot_before_);
+  show_screens();
   show_status();
 }
 
@@ -408,6 +454,7 @@ void CArmPanel::moved() {
 
 void CArmPanel::press(ShotMode mode) {
   if (!isVisible() || !isEnabled() || !in_room_ || !single_->isEnabled()) return;
+  others_->choose_own();
   console_.press(mode, CArmConsole::Clock::now());
   run_begins_ = true;
   pedal_timer_.start();
@@ -438,8 +485,7 @@ void CArmPanel::receive(const std::shared_ptr<const CArmPicture>& picture) {
     if (!in_room_) return;
     // Kept while X-rays are shown, too: it is not made again unless something changes.
     projection_ = screen_picture(*picture);
-    if (!maximum()) return;
-    last_->show_picture(projection_);
+    show_screens();
     return show_status();
   }
   const CArmConsole::Came came = console_.came(picture->order, picture->coarse, picture->shot);
@@ -447,7 +493,7 @@ void CArmPanel::receive(const std::shared_ptr<const CArmPicture>& picture) {
   if (came == CArmConsole::Came::shot) keep_shot();
   picture_ = picture;
   shot_ = screen_picture(*picture);
-  if (!maximum()) last_->show_picture(shot_);
+  show_screens();
   show_status();
   tick();
   if (console_.idle()) pedal_timer_.stop();
@@ -455,11 +501,11 @@ void CArmPanel::receive(const std::shared_ptr<const CArmPicture>& picture) {
 
 // The picture beside the last one is that of the press before it: a live picture changes too soon to be compared with.
 void CArmPanel::keep_shot() {
-  if (std::exchange(run_begins_, false)) {
-    shot_before_ = shot_;
-    if (!maximum()) before_->show_picture(shot_before_);
-  }
+  const bool first = std::exchange(run_begins_, false);
+  if (first) shot_before_ = shot_;
   show_counters();
+  shared_.add(console_.shots().back(), first, console_.totals());
+  share();
   if (!file_) return;
   if (const Result<void> kept = file_->add(console_.shots().back()); !kept) {
     fault_ = QString::fromStdString(kept.error().message);
@@ -469,15 +515,64 @@ void CArmPanel::keep_shot() {
   }
 }
 
+// The room is told of what was shot also after the panel was hidden.
+void CArmPanel::share() {
+  if (observes_ || !not_shared_.isEmpty()) shared_.begin();
+  if (shared_.idle()) return share_timer_.stop();
+  share_timer_.start();
+  const std::optional<SharedShots::Message> message = shared_.due(SharedShots::Clock::now());
+  if (!message) return;
+  events_.share(*message, [this](const Result<RoomAnswer>& answer) {
+    shared_.answered();
+    // A room that is away for a while gets the next one.
+    if (answer || answer.error().code == ErrorCode::unavailable || answer.error().code == ErrorCode::cancelled) return;
+    not_shared_ = QString::fromStdString(answer.error().message);
+    show_status();
+  });
+}
+
+void CArmPanel::take_others() {
+  if (!in_room_) return;
+  const ShotsOfAll all = events_.shots();
+  const auto self = std::ranges::find(all.people, all.self, &PersonSeen::author);
+  observes_ = self != all.people.end() && self->role == Role::observer;
+  others_->take(all);
+}
+
+void CArmPanel::show_others(const std::optional<ShotRun>& run) {
+  others_picture_.reset();
+  // While a press goes on, its last picture stays until the next one is there.
+  if (!run || !others_run_ || !same_press(*run, *others_run_)) others_shot_ = {};
+  others_run_ = run;
+  if (run) {
+    kind_->setCurrentIndex(0);
+    others_image_->make_again(++others_id_, run->last, metal_in_beam());
+    inside_.wake();
+  } else {
+    others_image_->drop();
+  }
+  show_screens();
+  show_status();
+}
+
+void CArmPanel::receive_others(const std::shared_ptr<const CArmPicture>& picture) {
+  // One of an earlier choice may still be on its way.
+  if (!others_->shown() || picture->order != others_id_) return;
+  others_picture_ = picture;
+  others_shot_ = screen_picture(*picture);
+  show_screens();
+  show_status();
+}
+
 Result<void> CArmPanel::save(const std::filesystem::path& file, bool replace) const {
-  const QImage& shown = (maximum() ? projection_ : shot_).image;
-  if (shown.isNull()) return failure(ErrorCode::not_found, "there is no picture yet; shoot one first");
+  const QImage& image = shown().image;
+  if (image.isNull()) return failure(ErrorCode::not_found, "there is no picture yet; shoot one first");
   std::error_code ignored;
   if (!replace && std::filesystem::exists(file, ignored))
     return failure(ErrorCode::exists, file.string() + " is there already; choose another name");
   QByteArray bytes;
   QBuffer buffer(&bytes);
-  if (!shown.save(&buffer, "PNG"))
+  if (!image.save(&buffer, "PNG"))
     return failure(ErrorCode::internal, "there is not enough memory for " + file.string());
   return write_file(file, std::string_view(bytes.constData(), static_cast<std::size_t>(bytes.size())));
 }
@@ -499,6 +594,8 @@ void CArmPanel::showEvent(QShowEvent* event) {
   qApp->installEventFilter(this);
   status_timer_.start();
   inside_.set_visible(image_, true);
+  inside_.set_visible(others_image_, true);
+  take_others();
   show_status();
 }
 
@@ -508,6 +605,7 @@ void CArmPanel::hideEvent(QHideEvent* event) {
   status_timer_.stop();
   stop();
   inside_.set_visible(image_, false);
+  inside_.set_visible(others_image_, false);
 }
 
 void CArmPanel::changeEvent(QEvent* event) {

@@ -1,5 +1,6 @@
 // The C-arm: X-ray pictures of the bone as it is now. A person turns the arm, presses a pedal, and reads what was shot.
-// Nothing is computed and no X-ray is shot unless somebody asks for it while the panel is shown.
+// Nothing is computed and no X-ray is shot unless somebody asks for it while the panel is shown. The others in the room
+// are told of each shot, and theirs can be seen here.
 #pragma once
 #include <QCoreApplication>
 #include <QImage>
@@ -12,9 +13,12 @@
 #include <optional>
 #include <span>
 
+#include "viewer_client/desktop/others_shots.hpp"
 #include "viewer_client/inside/c_arm_console.hpp"
 #include "viewer_client/inside/c_arm_image.hpp"
+#include "viewer_client/inside/shared_shots.hpp"
 #include "viewer_client/inside/shot_file.hpp"
+#include "viewer_client/scene/room_answer.hpp"
 
 class QComboBox;
 class QDoubleSpinBox;
@@ -49,6 +53,10 @@ class CArmPanel : public QWidget {
   struct Events {
     std::function<InBeam()> in_beam;
     std::function<void(const QString&)> say;
+    // Of everybody in the room, this window included.
+    std::function<ShotsOfAll()> shots;
+    // Tells the room. The answer comes in the GUI thread, unless the room is left.
+    std::function<void(const SharedShots::Message&, std::function<void(const Result<RoomAnswer>&)>)> share;
   };
   // `inside` must outlive it.
   CArmPanel(InsideLink& inside, Events events, QWidget* parent = nullptr);
@@ -61,6 +69,8 @@ class CArmPanel : public QWidget {
   [[nodiscard]] const CArmConsole& console() const { return console_; }
   // Of the last shot. Null: there is none in this window.
   [[nodiscard]] const std::shared_ptr<const CArmPicture>& picture() const { return picture_; }
+  // Of another person, made again here. Null: the own ones are shown, or it is not there yet.
+  [[nodiscard]] const std::shared_ptr<const CArmPicture>& others_picture() const { return others_picture_; }
   // Writes the picture that is shown. Error: exists, unless `replace`; not_found (no picture); internal.
   [[nodiscard]] Result<void> save(const std::filesystem::path& file, bool replace) const;
 
@@ -88,6 +98,9 @@ class CArmPanel : public QWidget {
   void show_position();
   void show_counters();
   void show_status();
+  void show_screens();
+  [[nodiscard]] const ScreenPicture& shown() const;
+  [[nodiscard]] QString words_about(const InsideStatus& now) const;  // while pictures can be made
   void choose_file();
 
   void stop();  // nothing is made or waited for any more
@@ -97,6 +110,10 @@ class CArmPanel : public QWidget {
   void moved();  // by the user
   void receive(const std::shared_ptr<const CArmPicture>& picture);
   void keep_shot();
+  void share();
+  void take_others();
+  void show_others(const std::optional<ShotRun>& run);
+  void receive_others(const std::shared_ptr<const CArmPicture>& picture);
   [[nodiscard]] bool maximum() const;  // the panel shows maximum intensity, and no X-rays
   void show_maximum();
   [[nodiscard]] std::vector<PlacedMetal> metal_in_beam();
@@ -108,15 +125,24 @@ class CArmPanel : public QWidget {
   std::optional<ShotFile> file_;
   std::optional<MetalInBeam> metal_;  // of this room; none: nothing was shot yet
   std::size_t tools_known_ = 0;
-  std::shared_ptr<Mailbox> mailbox_;  // shared with image_
+  std::shared_ptr<Mailbox> mailbox_;  // shared with both images
   std::shared_ptr<CArmImage> image_;  // shared with the inside of the bone
   bool in_room_ = false;
   bool run_begins_ = false;  // the next shot is the first one of a press
-  QTimer pedal_timer_, status_timer_;
+  QTimer pedal_timer_, status_timer_, share_timer_;
+
+  SharedShots shared_;
+  bool observes_ = false;  // the others are not told
+  QString not_shared_;     // why the room does not take them
+  OthersShots* others_ = nullptr;
+  std::shared_ptr<CArmImage> others_image_;  // shared with the inside of the bone
+  std::uint64_t others_id_ = 0;              // of the newest picture that others_image_ was asked for
+  std::optional<ShotRun> others_run_;        // the press that it is of
+  std::shared_ptr<const CArmPicture> others_picture_;
 
   std::shared_ptr<const CArmPicture> picture_;
   CArmScreen *last_ = nullptr, *before_ = nullptr;
-  ScreenPicture shot_, shot_before_, projection_;
+  ScreenPicture shot_, shot_before_, projection_, others_shot_;
   QComboBox* kind_ = nullptr;
   QPushButton *single_ = nullptr, *pulse_ = nullptr, *live_ = nullptr, *save_ = nullptr;
   QLabel *shots_ = nullptr, *seconds_ = nullptr, *dose_ = nullptr, *words_ = nullptr;

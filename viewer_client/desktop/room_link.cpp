@@ -67,6 +67,10 @@ std::vector<PersonSeen> RoomLink::people() const {
   return people_ != nullptr ? people_->people() : std::vector<PersonSeen>();
 }
 
+std::vector<ShotRun> RoomLink::shots() const { return people_ != nullptr ? people_->shots() : std::vector<ShotRun>(); }
+
+AuthorId RoomLink::self() const { return people_ != nullptr ? people_->self() : AuthorId{}; }
+
 void RoomLink::ask(Request request, Answered answered) {
   if (!joined()) return answered(failure(ErrorCode::unavailable, "there is no room yet"));
   {

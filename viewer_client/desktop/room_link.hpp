@@ -45,6 +45,9 @@ class RoomLink : public QObject {
   [[nodiscard]] RenderQueue& queue() { return queue_; }
   // Everybody in the room, as far as the server says. Empty until it does.
   [[nodiscard]] std::vector<PersonSeen> people() const;
+  // The latest shots of everybody's C-arm, and who of the people this window is (null: not known yet).
+  [[nodiscard]] std::vector<ShotRun> shots() const;
+  [[nodiscard]] AuthorId self() const;
   [[nodiscard]] bool joined() const { return subscription_ != nullptr; }
   [[nodiscard]] bool interrupted() const { return subscription_ && subscription_->interrupted(); }
   [[nodiscard]] std::optional<Error> failure_seen() const;

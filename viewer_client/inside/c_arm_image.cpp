@@ -48,8 +48,18 @@ CArmImage::CArmImage(Shown shown, const radiology::Intensifier& intensifier)
     : shown_(std::move(shown)), intensifier_(intensifier) {}
 
 void CArmImage::make(const ShotOrder& order, std::int64_t time_unix_ms, std::vector<PlacedMetal> metal) {
+  CArmShot shot;
+  shot.time_unix_ms = time_unix_ms;
+  shot.mode = order.mode;
+  shot.position = order.position;
+  shot.exposure_s = exposure_of(order.mode);
+  shot.seed = order.seed;
+  make_again(order.id, shot, std::move(metal));
+}
+
+void CArmImage::make_again(std::uint64_t id, const CArmShot& shot, std::vector<PlacedMetal> metal) {
   const MutexLock lock(mutex_);
-  waiting_ = Request{order, time_unix_ms, std::move(metal)};
+  waiting_ = Request{id, shot, std::move(metal)};
 }
 
 void CArmImage::show_maximum(const std::optional<CArmPosition>& position) {
@@ -64,7 +74,7 @@ void CArmImage::drop() {
 
 bool CArmImage::outdated(const CArmPosition& position, Projection projection) const {
   const MutexLock lock(mutex_);
-  if (waiting_ && !(waiting_->order.position == position)) return true;
+  if (waiting_ && !(waiting_->shot.position == position)) return true;
   // The whole picture of a shot comes all the same: somebody waits for it.
   return projection == Projection::most && maximum_ && !(*maximum_ == position);
 }
@@ -123,30 +133,24 @@ void CArmImage::renew(Layers& layers, const std::vector<PlacedMetal>& metal, std
 }
 
 void CArmImage::shoot(const radiology::BoneHu& bone, const Request& request, const KeepGoing& keep_going) {
-  const ShotOrder& order = request.order;
-  CArmShot shot;
-  shot.time_unix_ms = request.time_unix_ms;
-  shot.mode = order.mode;
-  shot.position = order.position;
-  shot.exposure_s = exposure_of(order.mode);
-  shot.seed = order.seed;
-  if (fits(order.position, Projection::attenuation)) {
+  CArmShot shot = request.shot;
+  if (fits(shot.position, Projection::attenuation)) {
     const std::vector<PixelBox> changed = fine_->image.recast(bone, changed_.boxes);
     changed_ = {};
     renew(*fine_, request.metal, changed);
-    return show_shot(*fine_, shot, order.id, false);
+    return show_shot(*fine_, shot, request.id, false);
   }
   fine_.reset();
-  std::optional<Layers> coarse = cast(bone, order.position, kCoarser, Projection::attenuation);
+  std::optional<Layers> coarse = cast(bone, shot.position, kCoarser, Projection::attenuation);
   if (!coarse) return;
   renew(*coarse, request.metal, {coarse->image.beam().detector.whole()});
-  show_shot(*coarse, shot, order.id, true);
-  if (!keep_going(0.5) || outdated(order.position, Projection::attenuation)) return;
-  fine_ = cast(bone, order.position, 1, Projection::attenuation);
+  show_shot(*coarse, shot, request.id, true);
+  if (!keep_going(0.5) || outdated(shot.position, Projection::attenuation)) return;
+  fine_ = cast(bone, shot.position, 1, Projection::attenuation);
   changed_ = {};
   if (!keep_going(0.9)) return;
   renew(*fine_, request.metal, {fine_->image.beam().detector.whole()});
-  show_shot(*fine_, shot, order.id, false);
+  show_shot(*fine_, shot, request.id, false);
 }
 
 void CArmImage::show_projection(const radiology::BoneHu& bone, const CArmPosition& position,
@@ -167,7 +171,7 @@ void CArmImage::show_projection(const radiology::BoneHu& bone, const CArmPositio
   show_maximum_of(*fine_, false);
 }
 
-// The first picture of a shot sets its kerma and dose, because its photons are there once.
+// The first picture of a new shot sets its kerma and dose, because its photons are there once.
 void CArmImage::show_shot(const Layers& layers, CArmShot& shot, std::uint64_t order, bool coarse) const {
   const ConeBeam& beam = layers.image.beam();
   if (shot.air_kerma_at_metre_ugy == 0.0) {

@@ -19,7 +19,7 @@ namespace osteon {
 
 struct CArmPicture {
   std::uint64_t order = 0;  // 0: a maximum intensity projection, which is no shot
-  CArmShot shot;            // without its number
+  CArmShot shot;            // without its number, unless it was made again
   bool coarse = false;      // fewer and larger pixels; the whole picture follows, unless something newer does
   int columns = 0, rows = 0;
   std::vector<std::uint8_t> grey;  // row by row
@@ -40,6 +40,10 @@ class CArmImage final : public InsidePainter {
 
   // Makes this picture at the next paint(). A newer order takes the place of one that waits. [any thread]
   void make(const ShotOrder& order, std::int64_t time_unix_ms, std::vector<PlacedMetal> metal);
+  // The same for a shot that was made before, by this window or another: from where it stood, with its kerma and its
+  // noise. `id` takes the place of an order's. With the same bone and metal it is the same picture, to the last bit.
+  // [any thread]
+  void make_again(std::uint64_t id, const CArmShot& shot, std::vector<PlacedMetal> metal);
   // Shows a maximum intensity projection from there, and again after each change of the bone. None: no more.
   // [any thread]
   void show_maximum(const std::optional<CArmPosition>& position);
@@ -50,8 +54,8 @@ class CArmImage final : public InsidePainter {
 
  private:
   struct Request {
-    ShotOrder order;
-    std::int64_t time_unix_ms = 0;
+    std::uint64_t id = 0;
+    CArmShot shot;  // kerma 0: its picture sets it
     std::vector<PlacedMetal> metal;
   };
   // The layers of one radiograph, with as many photons as 1 µGy gives.

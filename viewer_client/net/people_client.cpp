@@ -23,7 +23,7 @@ using Clock = std::chrono::steady_clock;
 
 constexpr std::chrono::milliseconds kPeopleRetryPause{200};
 constexpr std::chrono::seconds kPeopleAnswerTime{30};
-constexpr std::size_t kMostWords = 64;
+constexpr std::size_t kMostWords = 64, kMostRuns = 64;
 
 Error error_of(const grpc::Status& status) {
   switch (status.error_code()) {
@@ -68,6 +68,11 @@ Result<PersonSeen> person_of(const v1::Person& sent) {
     person.look = *look;
   }
   person.cuts = sent.session_cuts();
+  if (sent.has_session_shots()) {
+    const Result<ShotTotals> shots = wire::from_wire(sent.session_shots());
+    if (!shots) return tl::unexpected(shots.error());
+    person.shots = *shots;
+  }
   return person;
 }
 
@@ -84,6 +89,7 @@ struct PeopleClient::Impl {
   std::map<AuthorId, PersonSeen> people OSTEON_GUARDED_BY(mutex);
   std::map<std::uint32_t, Annotation> annotations OSTEON_GUARDED_BY(mutex);
   std::deque<WordsSeen> words OSTEON_GUARDED_BY(mutex);
+  std::deque<ShotRun> runs OSTEON_GUARDED_BY(mutex);
   bool complete OSTEON_GUARDED_BY(mutex) = false;
   std::optional<Error> failure OSTEON_GUARDED_BY(mutex);
   std::shared_ptr<grpc::ClientContext> stream
@@ -135,6 +141,12 @@ Result<void> PeopleClient::Impl::take(const v1::WatchPeopleResponse& news) {
     if (!one) return tl::unexpected(one.error());
     drawn.push_back(std::move(*one));
   }
+  std::vector<ShotRun> shot;
+  for (const v1::ShotRun& sent : news.shots()) {
+    const Result<ShotRun> run = wire::from_wire(sent);
+    if (!run) return tl::unexpected(run.error());
+    shot.push_back(*run);
+  }
   const MutexLock lock(mutex);
   if (news.complete()) {
     people.clear();
@@ -148,6 +160,11 @@ Result<void> PeopleClient::Impl::take(const v1::WatchPeopleResponse& news) {
     if (!words.empty() && said.room_seq() <= words.back().place.value) continue;
     words.push_back({RoomSeq{said.room_seq()}, AuthorId{said.from()}, AuthorId{said.to()}, said.words()});
     if (words.size() > kMostWords) words.pop_front();
+  }
+  for (const ShotRun& run : shot) {
+    std::erase_if(runs, [&](const ShotRun& known) { return same_press(known, run); });
+    runs.push_back(run);
+    if (runs.size() > kMostRuns) runs.pop_front();
   }
   complete = true;
   changed.notify_all();
@@ -276,6 +293,11 @@ std::vector<Annotation> PeopleClient::annotations() const {
 std::vector<WordsSeen> PeopleClient::words() const {
   const MutexLock lock(impl_->mutex);
   return {impl_->words.begin(), impl_->words.end()};
+}
+
+std::vector<ShotRun> PeopleClient::shots() const {
+  const MutexLock lock(impl_->mutex);
+  return {impl_->runs.begin(), impl_->runs.end()};
 }
 
 bool PeopleClient::wait(const std::function<bool()>& done, std::chrono::milliseconds patience) const {

@@ -35,6 +35,9 @@ class PeopleClient final : public SupervisionClient {
   // The error that ended the connection for good.
   [[nodiscard]] std::optional<Error> failure_seen() const;
 
+  // The latest shots of everybody, one state of each press, in the order in which they came.
+  [[nodiscard]] std::vector<ShotRun> shots() const;
+
   AuthorId self() const override;
   std::vector<PersonSeen> people() const override;
   std::vector<Annotation> annotations() const override;

@@ -13,6 +13,7 @@
 #include "common/wire/convert.hpp"
 #include "common/wire/plan.hpp"
 #include "common/wire/room_client.hpp"
+#include "osteon/v1/people.grpc.pb.h"
 #include "osteon/v1/plan.grpc.pb.h"
 #include "osteon/v1/room.grpc.pb.h"
 #include "osteon/v1/watch.grpc.pb.h"
@@ -62,16 +63,16 @@ struct RequestPath {
 };
 
 // One request to the room and its answer.
-template <class Response, class Request>
+template <class Stub, class Response, class Request>
 Result<Response> ask(const RequestPath& path,
-                     grpc::Status (v1::RoomService::Stub::*call)(grpc::ClientContext*, const Request&, Response*),
+                     grpc::Status (Stub::*call)(grpc::ClientContext*, const Request&, Response*),
                      const Request& request) {
   grpc::ClientContext context;
   context.set_deadline(std::chrono::system_clock::now() + kAnswerTime);
   if (!path.open->add(context)) return failure(ErrorCode::cancelled, "the room is being left");
   Response response;
-  const auto stub = v1::RoomService::NewStub(path.channel);
-  const grpc::Status status = (stub.get()->*call)(&context, request, &response);
+  Stub stub(path.channel);
+  const grpc::Status status = (stub.*call)(&context, request, &response);
   path.open->remove(context);
   if (status.ok()) return response;
   switch (status.error_code()) {
@@ -80,6 +81,8 @@ Result<Response> ask(const RequestPath& path,
     case grpc::StatusCode::PERMISSION_DENIED:
     case grpc::StatusCode::UNAUTHENTICATED:
       return failure(ErrorCode::denied, status.error_message());
+    case grpc::StatusCode::UNIMPLEMENTED:
+      return failure(ErrorCode::unsupported, status.error_message());
     default:
       return failure(ErrorCode::unavailable, status.error_message());
   }
@@ -201,9 +204,8 @@ struct RoomSubscription::Impl {
   Result<void> read_mesh_stream();
   void fetch_tools(const RequestPath& path, std::uint64_t author, KnownTools& known);
   // The same request in the name of the viewer's author.
-  template <class Response, class Request>
-  Result<Response> ask_as_author(grpc::Status (v1::RoomService::Stub::*call)(grpc::ClientContext*, const Request&,
-                                                                             Response*),
+  template <class Stub, class Response, class Request>
+  Result<Response> ask_as_author(grpc::Status (Stub::*call)(grpc::ClientContext*, const Request&, Response*),
                                  Request request) const {
     const auto [path, author] = line();
     request.set_author(author);
@@ -573,6 +575,17 @@ Result<RoomAnswer> RoomSubscription::ping() {
   v1::ListToolsRequest request;
   const auto answer = impl_->ask_as_author(&v1::RoomService::Stub::ListTools, request);
   return answer ? Result<RoomAnswer>(RoomAnswer{}) : tl::unexpected(answer.error());
+}
+
+Result<RoomAnswer> RoomSubscription::share_shots(const ShotRun& run, const ShotTotals& session) {
+  v1::ShareShotsRequest request;
+  *request.mutable_run() = wire::to_wire(run);
+  *request.mutable_session() = wire::to_wire(session);
+  const auto answer = impl_->ask_as_author(&v1::PeopleService::Stub::ShareShots, request);
+  if (answer) return RoomAnswer{};
+  if (answer.error().code != ErrorCode::unsupported) return tl::unexpected(answer.error());
+  return failure(ErrorCode::unsupported,
+                 "the server is older than this window; install a newer Osteon where the server runs");
 }
 
 Result<RoomAnswer> RoomSubscription::undo(std::uint32_t count) {

@@ -12,6 +12,7 @@
 #include "common/core/result.hpp"
 #include "common/geometry/lattice.hpp"
 #include "common/surface/view_frustum.hpp"
+#include "common/tools/c_arm_shot.hpp"
 #include "common/volume/case_cache.hpp"
 #include "common/wire/credentials.hpp"
 #include "common/wire/room_client.hpp"
@@ -74,6 +75,9 @@ class RoomSubscription {
   // Requests to the room. Each waits for the answer. Errors: invalid_input, not_found (no such tool or item),
   // unavailable (nothing to undo, no answer).
   [[nodiscard]] Result<RoomAnswer> ping();  // a question without an effect, to see how long the answer takes
+  // The newest press of the own C-arm so far, for the others in the room. Also: denied (an observer's shots are not for
+  // others), unsupported (the server is too old).
+  [[nodiscard]] Result<RoomAnswer> share_shots(const ShotRun& run, const ShotTotals& session);
   [[nodiscard]] Result<RoomAnswer> undo(std::uint32_t count);
   [[nodiscard]] Result<RoomAnswer> undo_to(RoomSeq mark);
   [[nodiscard]] Result<RoomAnswer> mark(const std::string& label);

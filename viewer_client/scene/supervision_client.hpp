@@ -15,6 +15,7 @@
 #include "common/field/restrictions.hpp"
 #include "common/surface/view_frustum.hpp"
 #include "common/tools/annotation.hpp"
+#include "common/tools/c_arm_shot.hpp"
 
 namespace osteon {
 
@@ -29,6 +30,7 @@ struct PersonSeen {
   AuthorId decided_by;              // who decided it; null: unknown
   std::optional<ViewFrustum> look;  // their view, if it is known
   std::uint32_t cuts = 0;           // accepted
+  ShotTotals shots;                 // of their C-arm, as far as they said
   [[nodiscard]] bool pending() const { return decided && acknowledged < decided; }
 };
 

@@ -51,7 +51,7 @@ Names allowed(Role role) {
                   "/osteon.v1.FieldService/WatchField"});
   if (role >= Role::trainee)
     names.insert({"/osteon.v1.CuttingService/Session", room + "AddTool", room + "Undo", room + "Redo", room + "Mark",
-                  room + "SetSceneItem", room + "RemoveSceneItem", people + "Say"});
+                  room + "SetSceneItem", room + "RemoveSceneItem", people + "Say", people + "ShareShots"});
   if (role >= Role::instructor)
     names.insert({people + "Supervise", people + "Annotate", people + "Demonstrate", people + "EndDemonstration",
                   room + "RemoveBody", room + "SaveFields", rooms + "ListRooms", rooms + "DeleteRoom",
@@ -104,6 +104,7 @@ TEST(RoleTable, ShowsOthersToTheInstructorAlone) {
     EXPECT_EQ(may_receive(role, StreamContent::own_words), in_room);
     EXPECT_EQ(may_receive(role, StreamContent::own_supervision), in_room);
     EXPECT_EQ(may_receive(role, StreamContent::field), in_room);
+    EXPECT_EQ(may_receive(role, StreamContent::shots), in_room);
     EXPECT_EQ(may_receive(role, StreamContent::others_words), role == Role::instructor);
     EXPECT_EQ(may_receive(role, StreamContent::others_supervision), role == Role::instructor);
   }

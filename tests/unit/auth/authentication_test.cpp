@@ -168,8 +168,8 @@ bool has_author(const Method& method) { return method.request->FindFieldByName("
 
 void Authentication::expect_every_role_to_make_the_calls_that_are_for_it() {
   // The rules as the roles are described to people: what a role may do beyond watching.
-  const std::set<std::string> hands{"Session",      "AddTool",         "Undo", "Redo", "Mark",
-                                    "SetSceneItem", "RemoveSceneItem", "Say"},
+  const std::set<std::string> hands{"Session",      "AddTool",         "Undo", "Redo",      "Mark",
+                                    "SetSceneItem", "RemoveSceneItem", "Say",  "ShareShots"},
       instructors{"RemoveBody", "SaveFields", "Supervise", "Annotate", "Demonstrate", "EndDemonstration"},
       both{"ListRooms", "DeleteRoom", "VerifyRoom", "BranchRoom", "ReplayRoom", "ListCases"},
       operators{"CreateRoom", "CloseRoom", "ResumeRoom", "BackUpRoom", "UploadCase"};

@@ -474,8 +474,8 @@ TEST(CallRates, LetThroughAsManyAsTheTimeAllows) {
 }
 
 TEST(CallRates, AReserveHasItsCallsAndNotOneMore) {
-  for (const char* method :
-       {"/osteon.v1.RoomService/Join", "/osteon.v1.PeopleService/Say", "/osteon.v1.FieldService/WatchField"}) {
+  for (const char* method : {"/osteon.v1.RoomService/Join", "/osteon.v1.PeopleService/Say",
+                             "/osteon.v1.PeopleService/ShareShots", "/osteon.v1.FieldService/WatchField"}) {
     const CallRate* rate = find_call_rate(method);
     ASSERT_NE(rate, nullptr);
     CallRates rates;
@@ -507,13 +507,18 @@ TEST(CallRates, RememberNoMorePeopleThanTheirLimit) {
 TEST(CallRates, AreThoseOfCallsThatThereAre) {
   int limited = 0;
   for (const CallRow& entry : call_rows()) limited += find_call_rate(entry.method) != nullptr ? 1 : 0;
-  EXPECT_EQ(limited, 24);
+  EXPECT_EQ(limited, 25);
   // Every call that makes an entry of the journal.
   for (const char* method :
        {"Join", "Mark", "Undo", "Redo", "AddTool", "RemoveBody", "SetSceneItem", "RemoveSceneItem"})
     EXPECT_NE(find_call_rate(std::string("/osteon.v1.RoomService/") + method), nullptr) << method;
   for (const char* method : {"Say", "Annotate", "Supervise", "Demonstrate"})
     EXPECT_NE(find_call_rate(std::string("/osteon.v1.PeopleService/") + method), nullptr) << method;
+  // Four a second, as a window sends them, always pass. What is sent without an end is stopped.
+  const CallRate* shots = find_call_rate("/osteon.v1.PeopleService/ShareShots");
+  ASSERT_NE(shots, nullptr);
+  EXPECT_GE(shots->per_second, 2 * 4.0);
+  EXPECT_LE(shots->per_second, 10.0);
   // What copies the whole bone for each call comes less often than what does not.
   const CallRate *copies = find_call_rate("/osteon.v1.FieldService/WatchField"),
                  *joins = find_call_rate("/osteon.v1.RoomService/Join");

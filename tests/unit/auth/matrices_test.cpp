@@ -173,6 +173,7 @@ class Member {
   void note_people(const v1::WatchPeopleResponse& said) {
     note(said.people_size() > 0, "people people");
     note(said.annotations_size() > 0, "people scene");
+    note(said.shots_size() > 0, "people shots");
     const std::uint64_t me = room.author.value;
     for (const v1::Person& person : said.people()) {
       const bool decided = person.decided_room_seq() != 0 || person.has_supervision();
@@ -318,6 +319,7 @@ class Matrices : public ::testing::Test {
     happen([&](Room& room) {
       return room.annotate(ina_, {.kind = AnnotationKind::pointer, .points = {{0, 0, 0}}, .words = "here"});
     });
+    host().people().shot(sue_->author(), {.first_number = 1, .last = {.number = 1}}, {.shots = 1});
     decide_about(sue_->author());
     if (hand) decide_about(reader);
     say(sue_->author(), "to sue");
@@ -336,8 +338,8 @@ class Matrices : public ::testing::Test {
 constexpr Role kHands[] = {Role::trainee, Role::collaborator, Role::instructor};
 
 TEST_F(Matrices, EveryStreamSendsEveryRoleWhatIsForIt) {
-  const Seen of_watchers{"mesh surface",  "cutting tool_states", "cutting scene",   "field field",
-                         "people people", "people scene",        "people own_words"};
+  const Seen of_watchers{"mesh surface",  "cutting tool_states", "cutting scene",    "field field",
+                         "people people", "people scene",        "people own_words", "people shots"};
   const Seen of_hands{"people own_supervision", "session field",           "session scene",
                       "session tool_states",    "session own_supervision", "session own_words"};
   const Seen of_instructors{"people others_supervision", "people others_words"};

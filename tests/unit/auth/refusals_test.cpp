@@ -239,6 +239,24 @@ TEST_F(Refused, WhatMakesNoSenseIsRefusedWithAStatus) {
     v1::LookFromResponse response;
     return v1::WatchService::NewStub(ina->channel)->LookFrom(&context, request, &response);
   });
+  const auto share = [&](grpc::ClientContext& context, const ShotRun& run, const ShotTotals& session) {
+    v1::ShareShotsRequest request;
+    request.set_author(author);
+    *request.mutable_run() = wire::to_wire(run);
+    *request.mutable_session() = wire::to_wire(session);
+    v1::ShareShotsResponse response;
+    return v1::PeopleService::NewStub(ina->channel)->ShareShots(&context, request, &response);
+  };
+  ShotRun run{.first_number = 1, .exposure_s = 0.02, .last = {.number = 1, .air_kerma_at_metre_ugy = 2.0}};
+  {
+    grpc::ClientContext context;
+    EXPECT_TRUE(share(context, run, {1, 0.02, 0.001}).ok()) << "a sound shot";
+  }
+  expect_refused("counts of shots", [&](grpc::ClientContext& context) {
+    return share(context, run, {1, kNan, 0.001});
+  });
+  run.last.position.orbit_rad = kNan;
+  expect_refused("shot", [&](grpc::ClientContext& context) { return share(context, run, {1, 0.02, 0.001}); });
   const auto in_session = [&](grpc::ClientContext& context, const v1::SessionRequest& request) {
     const auto session = v1::CuttingService::NewStub(ina->channel)->Session(&context);
     v1::SessionRequest open;

@@ -304,6 +304,93 @@ TEST(PeopleHost, DrawingsComeAndGoAndWordsAreBounded) {
   EXPECT_EQ(news.words(news.words_size() - 1).words(), "99") << "the newest message";
 }
 
+// A shot with this number.
+CArmShot shot_numbered(std::uint64_t number, ShotMode mode = ShotMode::single) {
+  CArmShot shot;
+  shot.number = number;
+  shot.mode = mode;
+  shot.position = {{1, 2, 3}, 0.01 * static_cast<double>(number), -0.5, {0, 10, 0}};
+  shot.air_kerma_at_metre_ugy = 1.0 / 3.0;
+  shot.seed = 70 + number;
+  return shot;
+}
+
+TEST(PeopleHost, ShotsOfACArmGoToEverybodyAndAPressHasOneState) {
+  Lesson lesson;
+  PresenceCursor cursor;
+  (void)lesson.news(cursor, lesson.instructor);
+  Presence& people = lesson.runtime.people();
+  const RoomSeq before = lesson.runtime.room_seq();
+  const ShotRun single{.author = lesson.instructor, .first_number = 1, .exposure_s = 0.02, .last = shot_numbered(1)};
+  people.shot(lesson.trainee, single, {1, 0.02, 0.001});
+  v1::WatchPeopleResponse news = lesson.news(cursor, lesson.instructor);
+  ASSERT_EQ(news.shots_size(), 1);
+  EXPECT_EQ(news.shots(0).author(), lesson.trainee.value) << "of the caller, whatever the message says";
+  const Result<ShotRun> sent = wire::from_wire(news.shots(0));
+  ASSERT_TRUE(sent) << sent.error().message;
+  EXPECT_EQ(sent->last, shot_numbered(1)) << "the same picture can be made of it";
+  ASSERT_EQ(news.people_size(), 1);
+  EXPECT_EQ(news.people(0).author(), lesson.trainee.value);
+  EXPECT_EQ(news.people(0).session_shots().shots(), 1u);
+  EXPECT_EQ(news.people(0).session_shots().exposure_s(), 0.02);
+  EXPECT_EQ(news.people(0).session_shots().dose_area_gy_cm2(), 0.001);
+
+  // Live pictures of one press: a reader gets the newest, after what was before it.
+  const auto live = [&](std::uint64_t last, double exposure_s) {
+    people.shot(lesson.trainee, {{}, 2, exposure_s, shot_numbered(last, ShotMode::live)}, {last, exposure_s, 0.01});
+  };
+  live(5, 0.25);
+  people.shot(lesson.other, {{}, 1, 0.02, shot_numbered(1)}, {1, 0.02, 0.001});
+  live(9, 0.5);
+  live(7, 0.375);  // came late
+  news = lesson.news(cursor, lesson.instructor);
+  ASSERT_EQ(news.shots_size(), 2);
+  EXPECT_EQ(news.shots(0).author(), lesson.other.value);
+  EXPECT_EQ(news.shots(1).author(), lesson.trainee.value);
+  EXPECT_EQ(news.shots(1).first_number(), 2u);
+  EXPECT_EQ(news.shots(1).last().number(), 9u);
+  EXPECT_EQ(news.shots(1).exposure_s(), 0.5);
+  EXPECT_EQ(Lesson::person(news, lesson.trainee)->session_shots().shots(), 9u);
+  EXPECT_EQ(people.news(cursor, lesson.instructor, {}), nullptr) << "everything was sent";
+
+  // Whoever comes later gets all of them, as far as they may. Nobody has shot who has not joined.
+  people.shot(AuthorId{99}, single, {1, 0.02, 0.001});
+  PresenceCursor later, without;
+  EXPECT_EQ(lesson.news(later, lesson.other).shots_size(), 3);
+  news = lesson.news(without, lesson.other, {.shots = false});
+  EXPECT_EQ(news.shots_size(), 0);
+  EXPECT_FALSE(Lesson::person(news, lesson.trainee)->has_session_shots());
+  EXPECT_EQ(lesson.runtime.room_seq(), before) << "it is no event of the room";
+}
+
+TEST(PeopleHost, ShotsAreBoundedAndComeAtMostTenTimesASecond) {
+  Lesson lesson;
+  class Reader final : public PresenceSubscriber {
+   public:
+    void changed() override { ++times; }
+    void end(const std::string&) override {}
+    std::size_t waiting() const override { return 0; }
+    int times = 0;
+  } reader;
+  Presence& people = lesson.runtime.people();
+  people.watch(reader);
+  const int at_first = reader.times;
+  // For a second, each tick of 8 ms with a shot of its own.
+  for (std::uint64_t number = 1; number <= 125; ++number) {
+    people.shot(lesson.trainee, {{}, number, 0.02, shot_numbered(number)}, {number, 0.02, 0.001});
+    lesson.tick();
+  }
+  EXPECT_GE(reader.times - at_first, 5);
+  EXPECT_LE(reader.times - at_first, 11);
+  PresenceCursor cursor;
+  const v1::WatchPeopleResponse news = lesson.news(cursor, lesson.instructor);
+  ASSERT_EQ(news.shots_size(), static_cast<int>(Presence::kMostRuns));
+  for (int i = 0; i < news.shots_size(); ++i)
+    EXPECT_EQ(news.shots(i).first_number(), 125 - Presence::kMostRuns + 1 + static_cast<std::uint64_t>(i));
+  EXPECT_EQ(Lesson::person(news, lesson.trainee)->session_shots().shots(), 125u) << "the counts are of all of them";
+  people.leave(reader);
+}
+
 // However many have joined and left, a reader is sent a bounded number.
 TEST(Presence, ThoseWhoWereHereLongestAgoAreLeftOut) {
   Room room(test::test_block());

@@ -225,6 +225,89 @@ TEST(Wire, RefusesBadAnnotationsByTheNameOfTheField) {
   refused([](v1::Annotation& a) { a.set_colour(1 << 24); }, "colour");
 }
 
+ShotRun sample_run() {
+  CArmShot shot;
+  shot.number = std::uint64_t{1} << 53U;
+  shot.time_unix_ms = 1796050000123;
+  shot.mode = ShotMode::live;
+  shot.position = {{1.5, -2.25, 0.1}, 0.3, -0.1, {0, 10, -200}};
+  shot.exposure_s = 1.0 / 15.0;
+  shot.air_kerma_at_metre_ugy = 1.0 / 3.0;
+  shot.dose_area_gy_cm2 = 1.35e-3;
+  shot.seed = std::numeric_limits<std::uint64_t>::max();
+  return {AuthorId{4}, 17, 2.5, shot};
+}
+
+TEST(Wire, AShotComesBackBitForBit) {
+  for (const ShotMode mode : {ShotMode::single, ShotMode::pulse, ShotMode::live}) {
+    ShotRun run = sample_run();
+    run.last.mode = mode;
+    v1::ShotRun parsed;
+    ASSERT_TRUE(parsed.ParseFromString(wire::to_wire(run).SerializeAsString()));
+    EXPECT_EQ(parsed.last().mode(), mode == ShotMode::single  ? v1::SHOT_MODE_SINGLE
+                                    : mode == ShotMode::pulse ? v1::SHOT_MODE_PULSE
+                                                              : v1::SHOT_MODE_LIVE);
+    const auto back = wire::from_wire(parsed);
+    ASSERT_TRUE(back) << back.error().message;
+    EXPECT_EQ(*back, run);
+  }
+  const ShotTotals totals{40, 2.75, 0.125};
+  const auto back = wire::from_wire(wire::to_wire(totals));
+  ASSERT_TRUE(back) << back.error().message;
+  EXPECT_EQ(*back, totals);
+}
+
+TEST(Wire, RefusesBadShotsByTheNameOfTheField) {
+  using Shot = v1::CArmShot;
+  const auto refused = [](const std::function<void(v1::ShotRun&)>& change, const std::string& field) {
+    v1::ShotRun message = wire::to_wire(sample_run());
+    change(message);
+    const auto back = wire::from_wire(message);
+    ASSERT_FALSE(back) << field;
+    EXPECT_EQ(back.error().code, ErrorCode::invalid_input);
+    EXPECT_EQ(back.error().message.find(field), 0u) << back.error().message;
+  };
+  // Every number that is not finite or beyond its limit.
+  const double nan = std::numeric_limits<double>::quiet_NaN(), inf = std::numeric_limits<double>::infinity();
+  using Set = void (Shot::*)(double);
+  for (const double bad : {nan, inf, -inf, -1e300, 1.001e9})
+    for (const auto& [set, field] : {std::pair<Set, std::string>(&Shot::set_orbit_rad, "shot.orbit_rad"),
+                                     {&Shot::set_tilt_rad, "shot.tilt_rad"},
+                                     {&Shot::set_exposure_s, "shot.exposure_s"},
+                                     {&Shot::set_air_kerma_at_metre_ugy, "shot.air_kerma_at_metre_ugy"},
+                                     {&Shot::set_dose_area_gy_cm2, "shot.dose_area_gy_cm2"}})
+      refused([&, set = set](v1::ShotRun& run) { (run.mutable_last()->*set)(bad); }, field);
+  for (const double bad : {nan, inf, -1.001e6, 1.001e6}) {
+    refused([&](v1::ShotRun& run) { run.mutable_last()->mutable_isocentre_mm()->set_y(bad); }, "shot.isocentre_mm");
+    refused([&](v1::ShotRun& run) { run.mutable_last()->mutable_translation_mm()->set_z(bad); }, "shot.translation_mm");
+  }
+  refused([](v1::ShotRun& run) { run.mutable_last()->set_orbit_rad(100.5); }, "shot.orbit_rad");
+  refused([](v1::ShotRun& run) { run.mutable_last()->set_exposure_s(-0.02); }, "shot.exposure_s");
+  refused([](v1::ShotRun& run) { run.mutable_last()->clear_air_kerma_at_metre_ugy(); }, "shot.air_kerma_at_metre_ugy");
+  refused([](v1::ShotRun& run) { run.mutable_last()->clear_mode(); }, "shot.mode");
+  refused([](v1::ShotRun& run) { run.mutable_last()->set_mode(static_cast<v1::ShotMode>(4)); }, "shot.mode");
+  refused([](v1::ShotRun& run) { run.mutable_last()->set_time_unix_ms(-1); }, "shot.time_unix_ms");
+  refused([](v1::ShotRun& run) { run.mutable_last()->set_time_unix_ms(100'000'000'000'001); }, "shot.time_unix_ms");
+  refused([](v1::ShotRun& run) { run.mutable_last()->clear_number(); }, "shot.number");
+  refused([](v1::ShotRun& run) { run.mutable_last()->set_number((1ULL << 53U) + 1); }, "shot.number");
+  refused([](v1::ShotRun& run) { run.clear_last(); }, "shot.mode");
+  refused([](v1::ShotRun& run) { run.clear_first_number(); }, "run.first_number");
+  refused([](v1::ShotRun& run) { run.mutable_last()->set_number(16); }, "run.first_number");
+  for (const double bad : {nan, -1.0, 1.001e9})
+    refused([&](v1::ShotRun& run) { run.set_exposure_s(bad); }, "run.exposure_s");
+
+  const auto bad_totals = [](const ShotTotals& totals, const std::string& field) {
+    const auto back = wire::from_wire(wire::to_wire(totals));
+    ASSERT_FALSE(back) << field;
+    EXPECT_EQ(back.error().message.find(field), 0u) << back.error().message;
+  };
+  bad_totals({0, 1.0, 1.0}, "session.shots");
+  for (const double bad : {nan, inf, -1e-9, 1.001e9}) {
+    bad_totals({1, bad, 1.0}, "session.exposure_s");
+    bad_totals({1, 1.0, bad}, "session.dose_area_gy_cm2");
+  }
+}
+
 TEST(Wire, RefusesPosesAndStatesThatAreNotNumbers) {
   v1::CuttingState state = wire::to_wire(CuttingState{});
   state.set_torque_n_mm(std::numeric_limits<double>::quiet_NaN());

@@ -47,10 +47,6 @@
         <translation>Speichern…</translation>
     </message>
     <message>
-        <source>Saves the last picture as a PNG file</source>
-        <translation>Speichert das letzte Bild als PNG-Datei</translation>
-    </message>
-    <message>
         <source>AP</source>
         <translation>a.-p.</translation>
     </message>
@@ -205,6 +201,26 @@
     <message>
         <source>It is no dose of a person.</source>
         <translation>Es ist keine Dosis eines Menschen.</translation>
+    </message>
+    <message>
+        <source>Saves the picture that is shown as a PNG file</source>
+        <translation>Speichert das gezeigte Bild als PNG-Datei</translation>
+    </message>
+    <message>
+        <source>%1: made again from the bone and the tools as they are now.</source>
+        <translation>%1: neu berechnet aus Knochen und Werkzeugen, wie sie jetzt sind.</translation>
+    </message>
+    <message>
+        <source>You are an observer: the others do not see your shots.</source>
+        <translation>Sie sind Beobachter: Die anderen sehen Ihre Aufnahmen nicht.</translation>
+    </message>
+    <message>
+        <source>The others do not see your shots: %1</source>
+        <translation>Die anderen sehen Ihre Aufnahmen nicht: %1</translation>
+    </message>
+    <message>
+        <source>A picture of another person</source>
+        <translation>Ein Bild eines anderen</translation>
     </message>
 </context>
 <context>
@@ -1489,6 +1505,53 @@
     <message>
         <source>The folder of a CT</source>
         <translation>Ordner eines CT</translation>
+    </message>
+</context>
+<context>
+    <name>OthersShots</name>
+    <message>
+        <source>Shots of the others in the room</source>
+        <translation>Aufnahmen der anderen im Raum</translation>
+    </message>
+    <message>
+        <source>Of a person the newest picture is shown, of a line below it that press.</source>
+        <translation>Von einer Person erscheint das neueste Bild, von einer Zeile darunter dieser Druck.</translation>
+    </message>
+    <message>
+        <source>The picture is made again from the bone and the tools as they are now.</source>
+        <translation>Das Bild wird neu berechnet aus Knochen und Werkzeugen, wie sie jetzt sind.</translation>
+    </message>
+    <message>
+        <source>Pictures of</source>
+        <translation>Bilder von</translation>
+    </message>
+    <message>
+        <source>Shots</source>
+        <translation>Aufnahmen</translation>
+    </message>
+    <message>
+        <source>Exposure, seconds</source>
+        <translation>Strahlzeit in Sekunden</translation>
+    </message>
+    <message>
+        <source>Dose-area product, nominal</source>
+        <translation>Dosisflächenprodukt, nominal</translation>
+    </message>
+    <message>
+        <source>Mine</source>
+        <translation>Mir</translation>
+    </message>
+    <message>
+        <source>Shot %1, %2</source>
+        <translation>Aufnahme %1, %2</translation>
+    </message>
+    <message>
+        <source>Shots %1 to %2, %3</source>
+        <translation>Aufnahmen %1 bis %2, %3</translation>
+    </message>
+    <message>
+        <source>%1, shot %2</source>
+        <translation>%1, Aufnahme %2</translation>
     </message>
 </context>
 <context>

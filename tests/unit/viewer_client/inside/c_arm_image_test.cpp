@@ -135,6 +135,28 @@ TEST_F(CArmPictures, AShotFromANewPlaceIsCoarseFirst) {
   EXPECT_NE(next[0]->grey, both[1]->grey);
 }
 
+// Of a record alone, on another computer: the same bytes, whichever picture had set the kerma.
+TEST_F(CArmPictures, AShotIsMadeAgainFromItsRecord) {
+  const auto seen = fresh(order_at(3, axial())), seen_next = second(order_at(4, axial()));
+  Arm other;
+  for (const auto& made : {seen, seen_next, seen}) {
+    CArmShot record = made->shot;
+    record.number = 17;
+    other.image.make_again(5, record, {});
+    const Pictures again = other.paint(bone_, {});
+    ASSERT_FALSE(again.empty());
+    EXPECT_FALSE(again.back()->coarse);
+    EXPECT_EQ(again.back()->order, 5u);
+    EXPECT_EQ(again.back()->shot, record);
+    EXPECT_EQ(again.back()->grey, made->grey);
+  }
+  EXPECT_NE(seen->grey, seen_next->grey);
+  // Of another bone it is another picture.
+  const InsideChange change = bore(0.0);
+  other.image.make_again(6, seen->shot, {});
+  EXPECT_NE(other.paint(bone_, change).back()->grey, seen->grey);
+}
+
 // Photons behind the plate are those of the kerma, times exp(−μ d). Brightness control gives 600 in each mm² there.
 // The dose-area product is the kerma at 1 m on the detector there: 30 x 22.5 cm.
 TEST_F(CArmPictures, PhotonsFollowTheLawOfBeerAndLambert) {

@@ -1,0 +1,215 @@
+// X-rays that one person shoots and another sees: a window and another person's C-arm, in a room with certificates.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <QAction>
+#include <QDockWidget>
+#include <QLabel>
+#include <QLocale>
+#include <QPushButton>
+#include <QSettings>
+#include <QTreeWidget>
+
+#include "osteon/v1/people.pb.h"
+#include "server/rpc/room_server.hpp"
+#include "tests/integration/window_bench.hpp"
+#include "tests/support/authentication/people.hpp"
+#include "tests/unit/room/cuts.hpp"
+#include "viewer_client/desktop/c_arm_panel.hpp"
+
+namespace osteon {
+namespace {
+
+using testing::HasSubstr;
+
+// A person who has a C-arm, and nothing else of a window.
+class OtherCArm {
+ public:
+  explicit OtherCArm(const RoomSubscriptionOptions& options) {
+    room_ = std::make_unique<RoomLink>(options,
+                                       RoomLink::Events{[] {},
+                                                        [this](const WatchedRoom& room) {
+                                                          inside_.set_room(room_.get());
+                                                          panel_->enter(room.bounds, {});
+                                                        },
+                                                        [](const Error& error) { ADD_FAILURE() << error.message; }});
+    CArmPanel::Events events;
+    events.in_beam = [] { return CArmPanel::InBeam{}; };
+    events.say = [](const QString& sentence) { ADD_FAILURE() << sentence.toStdString(); };
+    events.shots = [this] { return ShotsOfAll{room_->self(), room_->people(), room_->shots()}; };
+    events.share = [this](const SharedShots::Message& message, RoomLink::Answered answered) {
+      room_->ask([message](RoomSubscription& room) { return room.share_shots(message.run, message.session); },
+                 std::move(answered));
+    };
+    panel_ = std::make_unique<CArmPanel>(inside_, std::move(events));
+    panel_->show();
+  }
+  ~OtherCArm() {
+    panel_.reset();
+    inside_.set_room(nullptr);
+  }
+  OtherCArm(const OtherCArm&) = delete;
+  OtherCArm& operator=(const OtherCArm&) = delete;
+
+  [[nodiscard]] CArmPanel& panel() const { return *panel_; }
+
+ private:
+  InsideLink inside_;
+  std::unique_ptr<RoomLink> room_;
+  std::unique_ptr<CArmPanel> panel_;
+};
+
+QTreeWidget& tree_of(const QWidget& panel) { return *panel.findChild<QTreeWidget*>("c_arm_others"); }
+QPushButton* button_of(const QWidget& panel, const char* name) { return panel.findChild<QPushButton*>(name); }
+std::string text_of(const QWidget& panel, const char* label) {
+  return panel.findChild<QLabel*>(label)->text().toStdString();
+}
+
+class ShotsTest : public test::WindowBench {
+ protected:
+  void SetUp() override {
+    QSettings().setValue("tour/seen", true);
+    WindowBench::SetUp();
+    const Case bone = test::test_block();
+    ASSERT_TRUE(bone.save(dir_ / "case"));
+    auto rooms = std::make_unique<Rooms>(RoomsOptions{.cases = {{bone, dir_ / "case"}}});
+    ASSERT_TRUE(rooms->create("ward", nullptr));
+    auto started = RoomServer::start(std::move(rooms), "127.0.0.1:0", {.certificates = people_.server()});
+    ASSERT_TRUE(started.has_value()) << started.error().message;
+    server_ = std::move(*started);
+  }
+  // Every client has left before the server ends.
+  void TearDown() override {
+    WindowBench::TearDown();
+    server_.reset();
+  }
+  [[nodiscard]] CArmPanel& panel() const { return *dynamic_cast<CArmPanel*>(window_->findChild<QWidget*>("c_arm")); }
+  // The window, as this person.
+  void join(const std::string& name, Role role) {
+    window_->join({QString::fromStdString(server_->address()), "ward", "", people_.credentials(name, role, "ward")});
+    ASSERT_TRUE(until([&] { return view_->surface_shown(); })) << problem();
+    auto* dock = window_->findChild<QDockWidget*>("c_arm_panel");
+    if (!dock->isVisible()) dock->toggleViewAction()->trigger();
+    ASSERT_TRUE(until([&] { return button_of(panel(), "c_arm_shot")->isEnabled(); })) << problem();
+  }
+  [[nodiscard]] RoomSubscriptionOptions other(const std::string& name, Role role) {
+    RoomSubscriptionOptions options;
+    options.address = server_->address();
+    options.room = "ward";
+    options.credentials = people_.credentials(name, role, "ward");
+    options.keep_trying = true;
+    options.cache = dir_ / "cache";
+    return options;
+  }
+  // The whole picture of one shot.
+  static std::shared_ptr<const CArmPicture> shoot(const CArmPanel& panel) {
+    const std::uint64_t before = panel.console().totals().shots;
+    QTest::mouseClick(button_of(panel, "c_arm_shot"), Qt::LeftButton);
+    EXPECT_TRUE(until([&] { return panel.console().totals().shots == before + 1 && !panel.picture()->coarse; }));
+    return panel.picture();
+  }
+  // Waits until the panel shows another person's picture of these bytes.
+  static void expect_seen(const CArmPanel& panel, const CArmPicture& original) {
+    const auto seen = [&] {
+      const auto& shown = panel.others_picture();
+      return shown && !shown->coarse && shown->shot.seed == original.shot.seed;
+    };
+    ASSERT_TRUE(until(seen));
+    const CArmPicture& shown = *panel.others_picture();
+    EXPECT_EQ(shown.columns, original.columns);
+    EXPECT_EQ(shown.shot.position, original.shot.position);
+    EXPECT_EQ(shown.shot.air_kerma_at_metre_ugy, original.shot.air_kerma_at_metre_ugy);
+    EXPECT_EQ(shown.letters, original.letters);
+    EXPECT_EQ(shown.grey, original.grey) << "to the last bit";
+  }
+
+  test::TempDir dir_;
+  test::People people_;
+  std::unique_ptr<RoomServer> server_;
+};
+
+TEST_F(ShotsTest, EverybodySeesTheShotsOfTheOthers) {
+  join("ben", Role::trainee);
+  OtherCArm other_arm(other("ada", Role::instructor));
+  CArmPanel &ben = panel(), &ada = other_arm.panel();
+  ASSERT_TRUE(until([&] { return button_of(ada, "c_arm_shot")->isEnabled(); }));
+  QTreeWidget &of_ada = tree_of(ada), &of_ben = tree_of(ben);
+  EXPECT_FALSE(of_ada.isVisible()) << "nobody has shot";
+
+  // By keyboard.
+  QTest::mouseClick(button_of(ben, "c_arm_lateral"), Qt::LeftButton);
+  const auto lateral = shoot(ben);
+  ASSERT_TRUE(until([&] { return of_ada.isVisible(); }));
+  ASSERT_EQ(of_ada.topLevelItemCount(), 2);
+  const QTreeWidgetItem& row = *of_ada.topLevelItem(1);
+  EXPECT_EQ(row.text(0), "ben");
+  EXPECT_EQ(row.text(1), "1");
+  EXPECT_EQ(QLocale().toDouble(row.text(2)), 0.02);
+  EXPECT_NEAR(QLocale().toDouble(row.text(3)), lateral->shot.dose_area_gy_cm2, 0.0000051);
+  EXPECT_FALSE(ada.others_picture()) << "nobody has asked for it";
+  EXPECT_FALSE(button_of(ada, "c_arm_save")->isEnabled());
+  QTest::keyClick(&of_ada, Qt::Key_Down);
+  expect_seen(ada, *lateral);
+  EXPECT_THAT(text_of(ada, "c_arm_words"),
+              HasSubstr("ben, shot 1: made again from the bone and the tools as they are"));
+  EXPECT_TRUE(button_of(ada, "c_arm_save")->isEnabled());
+
+  // Live, the newest picture follows, and so do the counts.
+  QTest::mouseClick(button_of(ben, "c_arm_ap"), Qt::LeftButton);
+  QTest::mousePress(button_of(ben, "c_arm_live"), Qt::LeftButton);
+  EXPECT_TRUE(until([&] { return ben.console().totals().shots >= 6; })) << problem();
+  QTest::mouseRelease(button_of(ben, "c_arm_live"), Qt::LeftButton);
+  EXPECT_TRUE(until([&] { return ben.console().idle(); })) << problem();
+  const std::uint64_t shots = ben.console().totals().shots;
+  expect_seen(ada, *ben.picture());
+  EXPECT_TRUE(until([&] { return row.text(1) == QString::number(shots); })) << row.text(1).toStdString();
+  EXPECT_NEAR(QLocale().toDouble(row.text(2)), 0.02 + static_cast<double>(shots - 1) / 15.0, 0.0051);
+  ASSERT_EQ(row.childCount(), 2) << "a press is one line, the newest first";
+  EXPECT_THAT(row.child(0)->text(0).toStdString(), HasSubstr("Shots 2 to " + std::to_string(shots)));
+  EXPECT_EQ(row.child(0)->text(1), QString::number(shots - 1));
+  EXPECT_THAT(row.child(1)->text(0).toStdString(), HasSubstr("Shot 1,"));
+
+  // An earlier one again.
+  of_ada.setCurrentItem(row.child(1));
+  expect_seen(ada, *lateral);
+
+  // Each counts their own alone, and sees their own when they shoot.
+  EXPECT_EQ(text_of(ada, "c_arm_shots"), "0");
+  EXPECT_FALSE(of_ben.isVisible());
+  (void)shoot(ada);
+  EXPECT_EQ(of_ada.currentItem(), of_ada.topLevelItem(0));
+  EXPECT_FALSE(ada.others_picture());
+  EXPECT_EQ(text_of(ada, "c_arm_shots"), "1");
+  ASSERT_TRUE(until([&] { return of_ben.isVisible(); }));
+  EXPECT_EQ(of_ben.topLevelItem(1)->text(0), "ada");
+  EXPECT_EQ(ben.console().totals().shots, shots);
+  of_ben.setCurrentItem(of_ben.topLevelItem(1));
+  expect_seen(ben, *ada.picture());
+}
+
+TEST_F(ShotsTest, AnObserversShotsStayInTheirWindow) {
+  join("olga", Role::observer);
+  EXPECT_TRUE(until([&] { return text_of(panel(), "c_arm_words").find("You are an observer") != std::string::npos; }))
+      << text_of(panel(), "c_arm_words");
+  (void)shoot(panel());
+  EXPECT_EQ(text_of(panel(), "c_arm_shots"), "1");
+  QTest::qWait(1000);
+  PresenceCursor cursor;
+  v1::WatchPeopleResponse news;
+  const Bytes all = server_->rooms().find("ward").value()->runtime().people().news(cursor, {}, {});
+  ASSERT_TRUE(news.ParseFromString(*all));
+  EXPECT_EQ(news.shots_size(), 0);
+  for (const v1::Person& person : news.people()) EXPECT_FALSE(person.has_session_shots()) << person.name();
+
+  // They see the others' shots.
+  OtherCArm other_arm(other("ada", Role::instructor));
+  ASSERT_TRUE(until([&] { return button_of(other_arm.panel(), "c_arm_shot")->isEnabled(); }));
+  const auto original = shoot(other_arm.panel());
+  ASSERT_TRUE(until([&] { return tree_of(panel()).isVisible(); }));
+  tree_of(panel()).setCurrentItem(tree_of(panel()).topLevelItem(1));
+  expect_seen(panel(), *original);
+  EXPECT_FALSE(tree_of(other_arm.panel()).isVisible());
+}
+
+}  // namespace
+}  // namespace osteon
