@@ -35,8 +35,8 @@ TEST(PlanOffset, SeesTurnsShiftsAndDepthsApart) {
   EXPECT_NEAR(plan_offset(planned, pose_along({0, 0, -21.5}, {0, 0, -1})).depth_left_mm.value(), -1.5, kExact);
   EXPECT_NEAR(plan_offset(planned, pose_along({0, 0, -21.5}, {0, 0, 1})).angle_deg, 180.0, kExact);
   // A small angle keeps its digits.
-  const Vec3 nearly(std::sin(1e-4 * kRad), 0, -std::cos(1e-4 * kRad));
-  EXPECT_NEAR(plan_offset(planned, pose_along({0, 0, 0}, nearly)).angle_deg, 1e-4, 1e-9);
+  const Pose nearly{Vec3::Zero(), Eigen::Quaterniond(Eigen::AngleAxisd((180.0 - 1e-4) * kRad, Vec3::UnitY()))};
+  EXPECT_NEAR(plan_offset(planned, nearly).angle_deg, 1e-4, kExact);
 }
 
 // The axis through (1, 0, 0) along (1, 1, 1): the point (0, 0, 0) is sqrt(2/3) beside it, 1/sqrt(3) before its foot.
