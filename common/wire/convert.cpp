@@ -454,8 +454,8 @@ Result<Annotation> from_wire(const v1::Annotation& annotation) {
   Annotation out;
   out.id = annotation.annotation();
   out.author = {annotation.author()};
-  if (annotation.kind() < v1::ANNOTATION_KIND_POINTER || annotation.kind() > v1::ANNOTATION_KIND_LABEL)
-    return bad_field("drawn.kind", "must be pointer, line or label");
+  if (annotation.kind() < v1::ANNOTATION_KIND_POINTER || annotation.kind() > v1::ANNOTATION_KIND_PLANE)
+    return bad_field("drawn.kind", "must be pointer, line, label, axis or plane");
   out.kind = static_cast<AnnotationKind>(annotation.kind());
   if (annotation.points_size() % 3 != 0)
     return bad_field("drawn.points",

@@ -73,14 +73,17 @@ PlanEntry read_entry(const json& step) {
   if (!step.contains("entry") || !step.at("entry").is_object())
     throw Wrong("\"entry\" is missing; give {\"toward\": [x, y, z]} or {\"point_mm\": [x, y, z], \"axis\": [x, y, z]}");
   const json& entry = step.at("entry");
-  only(entry, {"toward", "point_mm", "axis", "beside_last_mm"});
+  only(entry, {"toward", "point_mm", "axis", "target_mm", "beside_last_mm"});
   PlanEntry result;
   if (entry.contains("toward")) result.toward = vector(entry, "toward");
-  if (entry.contains("point_mm") != entry.contains("axis"))
-    throw Wrong("\"entry\" needs \"point_mm\" and \"axis\" together");
-  if (entry.contains("point_mm")) {
-    result.point_mm = vector(entry, "point_mm");
-    result.axis = vector(entry, "axis");
+  if (entry.contains("point_mm") != (entry.contains("axis") != entry.contains("target_mm")) ||
+      (entry.contains("axis") && entry.contains("target_mm")))
+    throw Wrong("\"entry\" needs \"point_mm\" together with either \"axis\" or \"target_mm\"");
+  if (entry.contains("point_mm")) result.point_mm = vector(entry, "point_mm");
+  if (entry.contains("axis")) result.axis = vector(entry, "axis");
+  if (entry.contains("target_mm")) {
+    result.target_mm = vector(entry, "target_mm");
+    result.axis = *result.target_mm - *result.point_mm;
   }
   if (entry.contains("beside_last_mm")) result.beside_last_mm = numbers<2>(entry, "beside_last_mm");
   if (result.toward.has_value() + result.point_mm.has_value() + result.beside_last_mm.has_value() != 1)

@@ -212,6 +212,11 @@ Result<ReadyStep> make_ready(const PlanStep& plan, const Case& bone, const ToolF
   }
   step.rotation = pose_along(Vec3::Zero(), step.site.axis).rotation;
   step.item = *tool;
+  if (plan.action == Action::drill && plan.entry.target_mm && plan.to_mm == 0.0) {
+    step.plan.to_mm = (*plan.entry.target_mm - step.site.entry_mm).dot(step.site.axis);
+    if (!(step.plan.to_mm > 0.0))
+      return failure(ErrorCode::invalid_input, "entry.target_mm lies before the bone; choose a point within it");
+  }
   if (plan.action == Action::screw) {
     // A driver turns it and follows the thread, one pitch per turn, until the head is on the bone.
     step.plan.leave = true;
@@ -226,8 +231,10 @@ Result<ReadyStep> make_ready(const PlanStep& plan, const Case& bone, const ToolF
                                                          : 0.0;
   if (deepest_mm + guide_length_mm > tool->reach_mm())
     return failure(ErrorCode::invalid_input,
-                   plan.to_mm > 0.0 ? "to_mm is deeper than the tool is long; choose a smaller one"
-                                    : "the bone is thicker here than the drill is long; choose another entry");
+                   plan.entry.target_mm && plan.to_mm == 0.0
+                       ? "entry.target_mm is deeper than the tool is long; choose a nearer one"
+                   : plan.to_mm > 0.0 ? "to_mm is deeper than the tool is long; choose a smaller one"
+                                      : "the bone is thicker here than the drill is long; choose another entry");
   return step;
 }
 

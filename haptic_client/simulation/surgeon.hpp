@@ -22,6 +22,7 @@ enum class HandKind : std::uint8_t { expert, novice, rig };
 struct PlanEntry {
   std::optional<Vec3> toward;
   std::optional<Vec3> point_mm, axis;  // both or none
+  std::optional<Vec3> target_mm;       // on that axis; a drill without to_mm stops there
   std::optional<std::array<double, 2>> beside_last_mm;
 };
 

@@ -252,7 +252,7 @@ class Changes {
         number(drawn.author.value);
         break;
       case 2:
-        drawn.kind = static_cast<AnnotationKind>(below(5));
+        drawn.kind = static_cast<AnnotationKind>(below(7));
         break;
       case 3:
         number(drawn.colour);

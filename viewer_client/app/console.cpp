@@ -67,6 +67,22 @@ std::optional<std::string> take_pair(std::vector<std::string>& words, std::strin
   return value;
 }
 
+const char* kind_of(AnnotationKind kind) {
+  switch (kind) {
+    case AnnotationKind::pointer:
+      return "pointer";
+    case AnnotationKind::line:
+      return "line";
+    case AnnotationKind::label:
+      return "label";
+    case AnnotationKind::axis:
+      return "axis";
+    case AnnotationKind::plane:
+      break;
+  }
+  return "plane";
+}
+
 }  // namespace
 
 Result<std::vector<std::string>> words_of_line(std::string_view line) {
@@ -487,11 +503,8 @@ Console::Answer Console::drawn(const Words& words) {
   const std::vector<Annotation> all = room_.annotations();
   std::string out = std::to_string(all.size()) + " drawings";
   for (const Annotation& one : all) {
-    const char* kind = one.kind == AnnotationKind::pointer ? "pointer"
-                       : one.kind == AnnotationKind::line  ? "line"
-                                                           : "label";
-    out += (&one == &all.front() ? ": " : "; ") + std::to_string(one.id) + " " + kind + " of " + name_of(one.author) +
-           " from";
+    out += (&one == &all.front() ? ": " : "; ") + std::to_string(one.id) + " " + kind_of(one.kind) + " of " +
+           name_of(one.author) + " from";
     for (const std::int32_t steps : one.points.front()) out += " " + osteon::text_of(steps * kQuantum_mm);
     if (!one.words.empty()) out += " " + quoted(one.words);
   }

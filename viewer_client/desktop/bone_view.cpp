@@ -59,6 +59,7 @@ void BoneView::show_room(RenderQueue* queue, const Box& bounds) {
   scene_->show_risks(risks_);
   (void)scene_->set_stereo(stereo_);
   clipping_.clear();
+  annotations_.clear();
   bounds_ = bounds;
   if (queue != nullptr) updater_.emplace(*queue, *scene_);
   look_overview();
@@ -241,6 +242,13 @@ void BoneView::show_risks(bool on) {
 void BoneView::clip(const Clipping& visible) {
   clipping_ = visible;
   scene_->clip(visible);
+  redraw();
+}
+
+void BoneView::show_annotations(const std::vector<Annotation>& drawn) {
+  if (drawn == annotations_) return;
+  annotations_ = drawn;
+  scene_->show_annotations(annotations_);
   redraw();
 }
 

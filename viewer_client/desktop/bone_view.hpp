@@ -79,6 +79,8 @@ class BoneView : public QVTKOpenGLNativeWidget {
   void show_planned(bool on);
   void show_risks(bool on);
   void clip(const Clipping& visible);
+  // What people have drawn on the bone of this room.
+  void show_annotations(const std::vector<Annotation>& drawn);
   // False: the display does not have the mode, and stereo is off.
   [[nodiscard]] bool set_stereo(StereoMode mode);
 
@@ -137,6 +139,7 @@ class BoneView : public QVTKOpenGLNativeWidget {
   QString notice_;
   bool marker_ = false, planned_ = false, risks_ = false;
   Clipping clipping_;
+  std::vector<Annotation> annotations_;
   StereoMode stereo_ = StereoMode::off;
   QTimer frame_timer_;
   std::chrono::steady_clock::time_point next_frame_{};

@@ -93,6 +93,9 @@ GaugesPanel::GaugesPanel(QWidget* parent) : QWidget(parent) {
   density_ = gauge(tr("Density"), "density");
   flutes_ = gauge(tr("Flutes filled"), "flutes");
   wear_ = gauge(tr("Wear"), "wear");
+  plan_angle_ = gauge(tr("Angle to the plan"), "plan_angle");
+  plan_beside_ = gauge(tr("Beside the plan"), "plan_beside");
+  plan_depth_ = gauge(tr("Depth left"), "plan_depth");
   gauge(tr("Temperature"), "temperature")->setText(tr("not simulated"));
   budget_ = new QProgressBar;
   budget_->setObjectName("budget");
@@ -127,6 +130,14 @@ GaugesPanel::GaugesPanel(QWidget* parent) : QWidget(parent) {
 }
 
 void GaugesPanel::show_push(double push_n) { push_->setText(tr("%1 N").arg(number(push_n, 0))); }
+
+void GaugesPanel::show_plan(const std::optional<PlanOffset>& offset, const QString& name) {
+  plan_angle_->setText(offset ? tr("%1°").arg(number(offset->angle_deg, 1)) : QString("–"));
+  plan_beside_->setText(offset ? tr("%1 mm").arg(number(offset->beside_mm, 1)) : QString("–"));
+  const bool deep = offset && offset->depth_left_mm;
+  plan_depth_->setText(deep ? tr("%1 mm").arg(number(*offset->depth_left_mm, 1)) : QString("–"));
+  for (QLabel* label : {plan_angle_, plan_beside_, plan_depth_}) label->setToolTip(offset ? name : QString());
+}
 
 void GaugesPanel::show_budget(const std::optional<HandForce>& hand) {
   const bool known = hand && hand->device_holds_n > 0.0;

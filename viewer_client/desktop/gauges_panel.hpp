@@ -1,6 +1,7 @@
 // The gauges of the tool: push, force of the bone and on the hand, torque, depth, spindle, feed, density, flutes and
-// wear. The gauge of the temperature says that it is not simulated. A plot shows both forces over the last ten
-// seconds, and a bar how much of what the device holds the hand gets.
+// wear; and how far the tool is from what is planned for it. The gauge of the temperature says that it is not
+// simulated. A plot shows both forces over the last ten seconds, and a bar how much of what the device holds the hand
+// gets.
 #pragma once
 #include <QCoreApplication>
 #include <QWidget>
@@ -9,6 +10,7 @@
 
 #include "common/input/pointer_link.hpp"
 #include "common/mechanics/cutting_state.hpp"
+#include "common/tools/plan_offset.hpp"
 
 class QLabel;
 class QProgressBar;
@@ -58,10 +60,13 @@ class GaugesPanel : public QWidget {
   // `pointer`: the newest report of the window's own pointer. None: another device holds the tool.
   void show(const CuttingState& state, const std::optional<PointerOutput>& pointer, double at_s);
   void show_push(double push_n);
+  // None: nothing is planned for this tool. `name`: of the axis or plane.
+  void show_plan(const std::optional<PlanOffset>& offset, const QString& name);
 
  private:
   void show_budget(const std::optional<HandForce>& hand);
   QLabel *bone_, *hand_, *torque_, *depth_, *spindle_, *feed_, *density_, *flutes_, *wear_, *push_;
+  QLabel *plan_angle_, *plan_beside_, *plan_depth_;
   QProgressBar* budget_;  // force on the hand as a share of what the device holds for long
   QLabel *budget_words_, *saturated_;
   ScrollingPlot* plot_;

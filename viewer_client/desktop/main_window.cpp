@@ -42,6 +42,7 @@
 #include "viewer_client/desktop/game_pad_controller.hpp"
 #include "viewer_client/desktop/gauges_panel.hpp"
 #include "viewer_client/desktop/imaging_page.hpp"
+#include "viewer_client/desktop/plan_bar.hpp"
 #include "viewer_client/desktop/properties_panel.hpp"
 #include "viewer_client/desktop/risk_gauge.hpp"
 #include "viewer_client/desktop/slices_panel.hpp"
@@ -67,7 +68,8 @@ constexpr int kFieldLetters = 40;  // most paths of files are seen as a whole
 constexpr const char* kFirstTool = "drill-3.2";
 
 // What changes the room, beside the tools.
-constexpr const char* kWorkActions[] = {"undo", "redo", "mark", "put_down", "spindle"};
+constexpr const char* kWorkActions[] = {"undo",       "redo",       "mark",      "put_down",  "spindle",  "draw_axis",
+                                        "draw_plane", "plan_point", "plan_name", "plan_wipe", "plan_undo"};
 constexpr const char* kOpeningActions[] = {"open_case", "import_scan", "join_room"};
 
 // The first file or folder that somebody drags over the window. Empty: none on this computer.
@@ -172,7 +174,7 @@ void MainWindow::make_panels() {
   QDockWidget* clipping = dock(tr("Clipping"), "clipping_panel", clipping_, Qt::RightDockWidgetArea);
   QDockWidget* connections = dock(tr("Connections"), "connection_panel",
                                   new ConnectionPanel([this] { return this->connections(); }), Qt::RightDockWidgetArea);
-  slices_ = new SlicesPanel(inside_);
+  make_slices();
   QDockWidget* slices = dock(tr("Slices"), "slices_panel", slices_, Qt::BottomDockWidgetArea);
   setCorner(Qt::BottomRightCorner, Qt::RightDockWidgetArea);  // the gauges keep their height
   c_arm_ = make_c_arm();
@@ -190,6 +192,16 @@ void MainWindow::make_panels() {
   connections->toggleViewAction()->setShortcut(QKeySequence("Ctrl+Shift+N"));
   slices->toggleViewAction()->setObjectName("slices");
   slices->toggleViewAction()->setShortcut(QKeySequence("Ctrl+Shift+L"));
+}
+
+void MainWindow::make_slices() {
+  slices_ = new SlicesPanel(
+      inside_, {[this](const Vec3& point_mm, const Vec3& into) { plan_->add_point(point_mm, into); },
+                [this](std::uint32_t id, std::size_t end, const Vec3& point_mm) { plan_->drag(id, end, point_mm); },
+                [this] { plan_->drop(); }});
+  plan_ = new PlanBar({*view_, *slices_, [this] { return room_.get(); }, [this] { put_tool_down(); },
+                       [this](const QString& sentence) { say(sentence); }});
+  slices_->add_row(plan_);
 }
 
 void MainWindow::make_status() {
@@ -435,6 +447,7 @@ void MainWindow::leave_room() {
   inside_.set_room(nullptr);
   room_.reset();
   slices_->reset({}, 1.0);
+  plan_->clear();
   practice_.reset();
   pointer_.reset();
   sound_control_->close();
@@ -463,6 +476,7 @@ void MainWindow::room_ended(const QString& sentence) {
 
 void MainWindow::take_tool(const std::string& tool) {
   if (!room_ || watching_) return tools_->show_held({});
+  plan_->give_up();
   const bool held = can_hold(tool) && pointer_;
   properties_->show_tool(tool, held ? QString()
                                : can_hold(tool)
@@ -490,6 +504,7 @@ void MainWindow::take_tool(const std::string& tool) {
 }
 
 void MainWindow::put_tool_down() {
+  plan_->give_up();
   placing_.clear();
   view_->set_placing(false);
   view_->set_holding(false);
@@ -508,7 +523,7 @@ void MainWindow::rest_other_hand() {
 }
 
 void MainWindow::place_item(const SurfaceHit& hit) {
-  if (placing_.empty()) return;
+  if (plan_->click(hit.point_mm) || placing_.empty()) return;
   ItemPlace where;
   where.point_mm = hit.point_mm;
   where.on_bone = true;
@@ -630,6 +645,7 @@ void MainWindow::refresh_gauges() {
   sound_control_->refresh();
   connection_->setText(room_->interrupted() ? tr("Connection lost, trying again")
                                             : tr("Connected to %1").arg(address_));
+  plan_->refresh();
   const std::optional<PointerOutput> hand = pointer_ ? pointer_->newest() : std::nullopt;
   const SceneUpdater* updater = view_->updater();
   const auto states = updater != nullptr ? updater->states() : std::span<const CuttingState>();
@@ -639,6 +655,7 @@ void MainWindow::refresh_gauges() {
   if (!states.empty()) {
     const CuttingState& state = own != nullptr ? *own : states.front();
     gauges_->show(state, hand, 1e-3 * static_cast<double>(clock_.elapsed()));
+    show_offset(state);
     show_other_hand(state);
   }
   const std::vector<HeldTool> tools = held_tools(states, people, own_name);
@@ -664,6 +681,11 @@ void MainWindow::refresh_gauges() {
                      : view_->pad_leads()   ? tr("Game pad")
                                             : tr("Pointer"));
   if (hand && !hand->trouble.empty()) say(QString::fromStdString(hand->trouble));
+}
+
+void MainWindow::show_offset(const CuttingState& state) {
+  const auto offset = plan_->offset_of(state);
+  gauges_->show_plan(offset ? std::optional(offset->first) : std::nullopt, offset ? offset->second : QString());
 }
 
 // Of the tool that the gauges show, as everybody in the room sees it.

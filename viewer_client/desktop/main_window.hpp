@@ -32,6 +32,7 @@ class ClippingPanel;
 class GaugesPanel;
 class GamePadController;
 class ImagingPage;
+class PlanBar;
 class PropertiesPanel;
 class SoundControl;
 class RiskGauge;
@@ -92,11 +93,13 @@ class MainWindow : public QMainWindow {
   void make_file_menu();
   void make_edit_menu();
   void make_view_menu();
+  void make_plan_menu();
   void make_tools_menu();
   void make_other_hand(QMenu* tools);
   void make_help_menu();
   void make_panels();
   [[nodiscard]] CArmPanel* make_c_arm();
+  void make_slices();
   void make_status();
 
   // `session`: to go on with in the case, as of practise().
@@ -138,6 +141,7 @@ class MainWindow : public QMainWindow {
   [[nodiscard]] TourStep next_step() const;
   void follow_pad();
   void refresh_gauges();
+  void show_offset(const CuttingState& state);
   void show_other_hand(const CuttingState& state);
   [[nodiscard]] ConnectionState connections();
   void choose_risk_limit();
@@ -156,6 +160,7 @@ class MainWindow : public QMainWindow {
   PropertiesPanel* properties_ = nullptr;
   ClippingPanel* clipping_ = nullptr;
   SlicesPanel* slices_ = nullptr;
+  PlanBar* plan_ = nullptr;
   CArmPanel* c_arm_ = nullptr;
   ViewOptions* view_options_ = nullptr;
   SoundControl* sound_control_ = nullptr;

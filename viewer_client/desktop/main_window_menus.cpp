@@ -14,6 +14,7 @@
 #include "viewer_client/desktop/language.hpp"
 #include "viewer_client/desktop/main_window.hpp"
 #include "viewer_client/desktop/menu_keys.hpp"
+#include "viewer_client/desktop/plan_bar.hpp"
 #include "viewer_client/desktop/practice_room.hpp"
 #include "viewer_client/desktop/properties_panel.hpp"
 #include "viewer_client/desktop/sound_control.hpp"
@@ -107,6 +108,13 @@ void MainWindow::make_view_menu() {
   fill_language_menu(*view->addMenu(tr("La&nguage")), [this](const QString& sentence) { say(sentence); });
 }
 
+void MainWindow::make_plan_menu() {
+  plan_->fill(*menuBar()->addMenu(tr("&Plan")), [this](QMenu* menu, const QString& words, const char* name,
+                                                       const QKeySequence& keys, std::function<void()> call) {
+    return add_action(menu, words, name, keys, std::move(call), true);
+  });
+}
+
 void MainWindow::make_tools_menu() {
   QMenu* tools = menuBar()->addMenu(tr("&Tools"));
   tools_->fill(*tools);
@@ -190,6 +198,7 @@ void MainWindow::make_actions() {
   make_file_menu();
   make_edit_menu();
   make_view_menu();
+  make_plan_menu();
   make_tools_menu();
   make_help_menu();
   for (const QAction* menu : menuBar()->actions()) {

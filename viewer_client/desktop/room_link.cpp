@@ -2,12 +2,32 @@
 
 #include <QCoreApplication>
 #include <QMetaObject>
+#include <algorithm>
 #include <chrono>
 #include <utility>
 
 #include "viewer_client/net/people_client.hpp"
 
 namespace osteon {
+
+namespace {
+
+// A drawing of an earlier session, or of another person, has another author. Only its author may change it, so a new
+// one takes its place.
+Result<std::uint32_t> redraw(PeopleClient& people, const DrawnPlan::Change& change) {
+  const std::vector<Annotation> now = people.annotations();
+  const bool own = change.before && std::ranges::any_of(now, [&](const Annotation& one) {
+                     return one.id == change.before->id && one.author == people.self();
+                   });
+  if (change.before && !(own && change.after))
+    if (const Result<void> gone = people.wipe_off(change.before->id); !gone) return tl::unexpected(gone.error());
+  if (!change.after) return 0;
+  Annotation drawn = *change.after;
+  drawn.id = own ? change.before->id : 0;
+  return people.draw(drawn);
+}
+
+}  // namespace
 
 RoomLink::RoomLink(const RoomSubscriptionOptions& options, Events events) : events_(std::move(events)) {
   queue_.set_wake([this] { in_gui(events_.arrived); });
@@ -70,6 +90,22 @@ std::vector<PersonSeen> RoomLink::people() const {
 std::vector<ShotRun> RoomLink::shots() const { return people_ != nullptr ? people_->shots() : std::vector<ShotRun>(); }
 
 AuthorId RoomLink::self() const { return people_ != nullptr ? people_->self() : AuthorId{}; }
+
+std::vector<Annotation> RoomLink::annotations() const {
+  return people_ != nullptr ? people_->annotations() : std::vector<Annotation>();
+}
+
+void RoomLink::draw(const DrawnPlan::Change& change, std::function<void(const Result<std::uint32_t>&)> answered) {
+  if (people_ == nullptr) return answered(failure(ErrorCode::unavailable, "there is no room yet"));
+  {
+    const MutexLock lock(mutex_);
+    jobs_.push_back([this, people = people_, change, answered = std::move(answered)](RoomSubscription&) {
+      const Result<std::uint32_t> answer = redraw(*people, change);
+      in_gui([answered, answer] { answered(answer); });
+    });
+  }
+  changed_.notify_all();
+}
 
 void RoomLink::ask(Request request, Answered answered) {
   if (!joined()) return answered(failure(ErrorCode::unavailable, "there is no room yet"));

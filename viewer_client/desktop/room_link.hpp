@@ -13,6 +13,7 @@
 #include "common/core/mutex.hpp"
 #include "common/core/result.hpp"
 #include "viewer_client/net/room_subscription.hpp"
+#include "viewer_client/scene/drawn_plan.hpp"
 #include "viewer_client/scene/render_queue.hpp"
 #include "viewer_client/scene/supervision_client.hpp"
 
@@ -37,6 +38,10 @@ class RoomLink : public QObject {
 
   // `answered` runs in the GUI thread. Before the room is joined, it gets the error unavailable.
   void ask(Request request, Answered answered);
+  // Changes what this window's user has drawn for all. The answer is the number of the new state, 0 if there is none.
+  void draw(const DrawnPlan::Change& change, std::function<void(const Result<std::uint32_t>&)> answered);
+  // What all people of the room have drawn, as far as the server says.
+  [[nodiscard]] std::vector<Annotation> annotations() const;
   // The window's view; returns at once.
   void look(const ViewFrustum& from);
   // Asks the server something without an effect, unless the answer to the last time is still to come.

@@ -17,6 +17,8 @@ namespace {
 constexpr double kNotchOfWheel = 120.0, kZoomOfNotch = 0.85;
 constexpr double kCrossGap_px = 6.0;  // of the cross round its middle, so that the tip is seen
 constexpr QRgb kToolColour = 0xfff0e442, kPlannedColour = 0xff56b4e9;
+constexpr double kEnd_px = 7.0, kEndDepth_mm = 2.0;  // how near the pointer and the slice are to an end that is taken
+constexpr double kNearlyAlong = 1e-6;
 
 // The middle of the pixel of the screen under the pointer.
 QPointF place_under(const QMouseEvent& event) { return event.localPos() + QPointF(0.5, 0.5); }
@@ -124,6 +126,7 @@ void SliceView::paintEvent(QPaintEvent*) {
     painter.setRenderHint(QPainter::Antialiasing);
     paint_lines(painter);
     paint_planned(painter);
+    paint_drawn(painter);
     painter.setPen(QPen(QColor(kToolColour), 1.5));
     for (const OutlinePart& part : outline_) painter.drawLine(to_widget(part.from), to_widget(part.to));
     paint_words(painter);
@@ -164,6 +167,42 @@ void SliceView::paint_planned(QPainter& painter) const {
   }
 }
 
+// An axis is a line with a bar across its target. A plane is the line in which it meets the slice. Ends that the mouse
+// can take are squares.
+void SliceView::paint_drawn(QPainter& painter) const {
+  const radiology::PixelGrid& plane = image_->plane;
+  const Vec3 normal = normal_of(plane);
+  for (const Annotation& one : overlay_.drawn) {
+    const std::vector<Vec3> points = points_mm(one);
+    const QColor colour(0xff000000 | one.colour);
+    const QPointF first = place_of(points[0]), second = place_of(points[1]);
+    painter.setPen(QPen(colour, one.id == overlay_.selected ? 2.5 : 1.5));
+    if (one.kind == AnnotationKind::axis) {
+      constexpr double kHalfBar_px = 6.0;
+      const QLineF line(first, second);
+      painter.drawLine(line);
+      QLineF bar = line.normalVector().unitVector();
+      bar.setLength(kHalfBar_px);
+      const QPointF half = bar.p2() - bar.p1();
+      if (line.length() > 1.0) painter.drawLine(second - half, second + half);
+    } else if (const Vec3 through = planned_direction(one), trace = normal.cross(through);
+               trace.norm() > kNearlyAlong) {
+      const Vec3 to_slice = trace.cross(through);  // within the plane
+      const Vec3 at = points[0] - depth_mm(plane, points[0]) / normal.dot(to_slice) * to_slice;
+      if (const auto line = project(plane, at, trace.normalized()))
+        painter.drawLine(to_widget(line->from), to_widget(line->to));
+    }
+    for (const std::size_t end : {std::size_t{0}, std::size_t{1}})
+      if (std::abs(depth_mm(plane, points[end])) <= kEndDepth_mm)
+        painter.fillRect(QRectF(place_of(points[end]) - QPointF(3.5, 3.5), QSizeF(7, 7)), colour);
+    write_outlined(painter, QRect(second.toPoint() + QPoint(8, -18), QSize(width(), 16)),
+                   Qt::AlignLeft | Qt::AlignVCenter, QString::fromStdString(one.words), colour);
+  }
+  if (!overlay_.begun) return;
+  painter.setPen(QPen(QColor(kPlannedColour), 2.0));
+  painter.drawEllipse(place_of(*overlay_.begun), kEnd_px, kEnd_px);
+}
+
 void SliceView::paint_words(QPainter& painter) const {
   const radiology::PixelGrid& plane = image_->plane;
   const QRect inner = rect().adjusted(kWordsEdge_px, kWordsEdge_px, -kWordsEdge_px, -kWordsEdge_px);
@@ -184,9 +223,43 @@ void SliceView::resizeEvent(QResizeEvent* event) {
   events_.resized();
 }
 
+std::optional<SliceView::End> SliceView::end_under(const QPointF& place) const {
+  std::optional<End> nearest;
+  double nearest_px = kEnd_px;
+  for (const Annotation& one : overlay_.drawn)
+    for (const std::size_t end : {std::size_t{0}, std::size_t{1}}) {
+      const Vec3 at = from_steps(one.points[end]);
+      const double depth = depth_mm(image_->plane, at), away_px = QLineF(place, place_of(at)).length();
+      if (std::abs(depth) > kEndDepth_mm || away_px > nearest_px) continue;
+      nearest = End{one.id, end, depth};
+      nearest_px = away_px;
+    }
+  return nearest;
+}
+
+// An end keeps its depth: it moves along the image.
+void SliceView::use_left_button(const QPointF& place) {
+  if (drew_) return;
+  if (held_)
+    events_.dragged(held_->id, held_->end, point_at(place) + held_->depth_mm * normal_of(image_->plane));
+  else
+    events_.point(point_at(place));
+}
+
 void SliceView::mousePressEvent(QMouseEvent* event) {
   last_ = event->pos();
-  if (image_ && event->button() == Qt::LeftButton) events_.point(point_at(place_under(*event)));
+  if (!image_ || event->button() != Qt::LeftButton) return;
+  const QPointF place = place_under(*event);
+  drew_ = overlay_.draws;
+  if (drew_) return events_.drawn(point_at(place));
+  held_ = end_under(place);
+  if (!held_) events_.point(point_at(place));
+}
+
+void SliceView::mouseReleaseEvent(QMouseEvent* event) {
+  if (event->button() != Qt::LeftButton) return;
+  drew_ = false;
+  if (std::exchange(held_, std::nullopt)) events_.dropped();
 }
 
 void SliceView::mouseMoveEvent(QMouseEvent* event) {
@@ -194,7 +267,7 @@ void SliceView::mouseMoveEvent(QMouseEvent* event) {
   last_ = event->pos();
   if (!image_) return;
   if (event->buttons() & Qt::LeftButton)
-    events_.point(point_at(place_under(*event)));
+    use_left_button(place_under(*event));
   else if (event->buttons() & Qt::RightButton)
     events_.window(by.x(), by.y());
   else if (event->buttons() & Qt::MiddleButton)

@@ -1,5 +1,5 @@
-// One slice of the bone's inside as an image. The left button sets the cross, the right one the window of HU, the
-// middle one moves the image. The wheel moves the slice.
+// One slice of the bone's inside as an image. The left button sets the cross, or draws axes and planes and moves their
+// ends. The right one sets the window of HU, the middle one moves the image. The wheel moves the slice.
 #pragma once
 #include <QCoreApplication>
 #include <QImage>
@@ -10,6 +10,7 @@
 #include <optional>
 #include <vector>
 
+#include "common/tools/annotation.hpp"
 #include "viewer_client/imaging/hu_window.hpp"
 #include "viewer_client/inside/slice_painter.hpp"
 
@@ -28,6 +29,10 @@ struct SliceOverlay {
     Vec3 point_mm, direction;
   };
   std::vector<Planned> planned;
+  std::vector<Annotation> drawn;  // axes and planes of people
+  std::uint32_t selected = 0;     // of them
+  bool draws = false;             // a click gives a point of a new one
+  std::optional<Vec3> begun;      // its first point
 };
 
 // [GUI thread]
@@ -36,7 +41,10 @@ class SliceView : public QWidget {
 
  public:
   struct Events {
-    std::function<void(const Vec3& point_mm)> point;            // the user wants the cross there
+    std::function<void(const Vec3& point_mm)> point;  // the user wants the cross there
+    std::function<void(const Vec3& point_mm)> drawn;  // a point of a new axis or plane
+    std::function<void(std::uint32_t id, std::size_t end, const Vec3& point_mm)> dragged;  // an end of a drawn one
+    std::function<void()> dropped;                                                         // that end
     std::function<void(double steps)> move;                     // the slice, along its normal
     std::function<void(const Vec3& by_mm)> shift;               // the image's middle
     std::function<void(double factor)> zoom;                    // of the length of a pixel
@@ -73,6 +81,7 @@ class SliceView : public QWidget {
   void resizeEvent(QResizeEvent* event) override;
   void mousePressEvent(QMouseEvent* event) override;
   void mouseMoveEvent(QMouseEvent* event) override;
+  void mouseReleaseEvent(QMouseEvent* event) override;
   void wheelEvent(QWheelEvent* event) override;
   void keyPressEvent(QKeyEvent* event) override;
   void leaveEvent(QEvent* event) override;
@@ -84,6 +93,15 @@ class SliceView : public QWidget {
   [[nodiscard]] Pixel to_image(const QPointF& place) const;
   void paint_lines(QPainter& painter) const;
   void paint_planned(QPainter& painter) const;
+  void paint_drawn(QPainter& painter) const;
+  // An end of an axis or plane that lies in the slice or near it.
+  struct End {
+    std::uint32_t id;
+    std::size_t end;
+    double depth_mm;
+  };
+  [[nodiscard]] std::optional<End> end_under(const QPointF& place) const;
+  void use_left_button(const QPointF& place);
   void paint_words(QPainter& painter) const;
 
   Events events_;
@@ -95,7 +113,9 @@ class SliceView : public QWidget {
   QImage grey_;
   SliceOverlay overlay_;
   std::vector<OutlinePart> outline_;
-  QPoint last_;  // of the mouse
+  QPoint last_;              // of the mouse
+  std::optional<End> held_;  // while the left button drags it
+  bool drew_ = false;        // the left button, which is still down, gave a point
 };
 
 }  // namespace osteon

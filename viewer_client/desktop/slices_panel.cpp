@@ -49,7 +49,8 @@ bool equal(const radiology::PixelGrid& a, const radiology::PixelGrid& b) {
 
 }  // namespace
 
-SlicesPanel::SlicesPanel(InsideLink& inside, QWidget* parent) : QWidget(parent), inside_(&inside) {
+SlicesPanel::SlicesPanel(InsideLink& inside, Drawing drawing, QWidget* parent)
+    : QWidget(parent), inside_(&inside), drawing_(std::move(drawing)) {
   painter_ = std::make_shared<SlicePainter>([this] {
     QMetaObject::invokeMethod(
         this, [this] { show_images(); }, Qt::QueuedConnection);
@@ -108,6 +109,12 @@ void SlicesPanel::add_views(QBoxLayout& all) {
   for (std::size_t i = 0; i < kSlices; ++i) {
     SliceView::Events events;
     events.point = [this](const Vec3& point_mm) { set_point(point_mm); };
+    events.drawn = [this, i](const Vec3& point_mm) {
+      set_point(point_mm);
+      drawing_.drawn(point_mm, normal_of(planes_of(view())[i]));
+    };
+    events.dragged = drawing_.dragged;
+    events.dropped = drawing_.dropped;
     events.move = [this, i](double steps) { move_slice(i, steps * pitch_mm_); };
     events.shift = [this](const Vec3& by_mm) {
       centre_mm_ += by_mm;
@@ -290,6 +297,23 @@ void SlicesPanel::refresh(const CuttingState* tool, const SurgicalPlan* plan) {
     for (const SurgicalPlan::Axis& axis : plan->axes)
       overlay_.planned.push_back({structure_title(axis.name), axis.point_mm, axis.direction});
   for (SliceView* view : views_) view->show_overlay(overlay_);
+}
+
+void SlicesPanel::show_drawn(const std::vector<Annotation>& drawn, std::uint32_t selected, bool draws,
+                             const std::optional<Vec3>& begun) {
+  overlay_.drawn = drawn;
+  overlay_.selected = selected;
+  overlay_.draws = draws;
+  overlay_.begun = begun;
+  for (SliceView* view : views_) view->show_overlay(overlay_);
+}
+
+void SlicesPanel::add_row(QWidget* row) { static_cast<QBoxLayout*>(layout())->insertWidget(1, row); }
+
+Vec3 SlicesPanel::into_image() const {
+  const auto planes = planes_of(view());
+  const auto focused = std::ranges::find_if(views_, [](const SliceView* one) { return one->hasFocus(); });
+  return normal_of(planes[focused == views_.end() ? 0 : static_cast<std::size_t>(focused - views_.begin())]);
 }
 
 void SlicesPanel::follow(const CuttingState* tool) {

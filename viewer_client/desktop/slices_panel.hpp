@@ -6,9 +6,11 @@
 #include <QPointer>
 #include <QWidget>
 #include <array>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "common/mechanics/cutting_state.hpp"
 #include "common/surface/surgical_plan.hpp"
@@ -30,7 +32,15 @@ class SlicesPanel : public QWidget {
   Q_DECLARE_TR_FUNCTIONS(SlicesPanel)
 
  public:
-  explicit SlicesPanel(InsideLink& inside, QWidget* parent = nullptr);
+  // What the mouse draws on the images.
+  struct Drawing {
+    // A point of a new axis or plane, and the direction through the image.
+    std::function<void(const Vec3& point_mm, const Vec3& into_image)> drawn;
+    std::function<void(std::uint32_t id, std::size_t end, const Vec3& point_mm)> dragged;
+    std::function<void()> dropped;
+  };
+
+  SlicesPanel(InsideLink& inside, Drawing drawing, QWidget* parent = nullptr);
 
   // A new bone, or none: an empty box.
   void reset(const Box& bone, double pitch_mm);
@@ -38,7 +48,17 @@ class SlicesPanel : public QWidget {
   // axes that are to be drawn.
   void refresh(const CuttingState* tool, const SurgicalPlan* plan);
 
+  // Axes and planes, which of them is selected, whether a click gives a point of a new one, and its first point.
+  void show_drawn(const std::vector<Annotation>& drawn, std::uint32_t selected, bool draws,
+                  const std::optional<Vec3>& begun);
+  // Puts the cross there.
+  void look_at(const Vec3& point_mm) { set_point(point_mm); }
+  // Above the images, below the panel's own choices.
+  void add_row(QWidget* row);
+
   [[nodiscard]] const Vec3& point_mm() const { return point_.point_mm(); }
+  // Unit vector through the image that has the keyboard's focus, else through the first one.
+  [[nodiscard]] Vec3 into_image() const;
   [[nodiscard]] const HuWindow& window() const { return window_; }
 
  protected:
@@ -69,6 +89,7 @@ class SlicesPanel : public QWidget {
   void set_sliders();
 
   QPointer<InsideLink> inside_;
+  Drawing drawing_;
   std::shared_ptr<SlicePainter> painter_;  // shared with the thread that paints
   Box bone_;
   double pitch_mm_ = 1.0;

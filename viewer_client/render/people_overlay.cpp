@@ -1,11 +1,13 @@
 #include "viewer_client/render/people_overlay.hpp"
 
 #include <vtkActor.h>
+#include <vtkAppendPolyData.h>
 #include <vtkArrowSource.h>
 #include <vtkCamera.h>
 #include <vtkCellArray.h>
 #include <vtkMatrix4x4.h>
 #include <vtkNew.h>
+#include <vtkPlaneSource.h>
 #include <vtkPoints.h>
 #include <vtkPolyData.h>
 #include <vtkPolyDataMapper.h>
@@ -36,8 +38,9 @@ constexpr double kArrow = 92.0, kTube = 2.8, kDot = 5.5, kBeside = 14.0, kAlongT
 constexpr int kLabelText = 16, kNameText = 15, kSaidText = 19, kHoldingText = 22, kHintText = 16;
 // Characters of the font are about half as wide as high.
 constexpr double kCharacter = 0.52;
-// Opacity of what lies behind the bone.
-constexpr double kThrough = 0.22;
+// Opacities of what lies behind the bone, and of planes.
+constexpr double kThrough = 0.22, kThroughPlane = 0.12, kPlane = 0.3;
+constexpr double kLeastPlane_mm = 30.0;  // the shorter side of its rectangle
 constexpr std::uint32_t kStroke = 0xffd040;
 
 using Rgb = std::array<double, 3>;
@@ -76,6 +79,20 @@ vtkSmartPointer<vtkActor> shape_actor(vtkAlgorithmOutput* shape, std::uint32_t c
   return actor;
 }
 
+// A rectangle about the line of its first two points.
+vtkSmartPointer<vtkPlaneSource> rectangle_about(const std::vector<Vec3>& points_mm) {
+  const Vec3 line = points_mm[1] - points_mm[0], along = line.normalized();
+  const Vec3 across = (points_mm[2] - points_mm[0] - along.dot(points_mm[2] - points_mm[0]) * along).normalized();
+  const double half_mm = 0.5 * std::max(kLeastPlane_mm, line.norm());
+  const Vec3 corner = 0.5 * (points_mm[0] + points_mm[1]) - half_mm * (along + across);
+  const Vec3 first = corner + 2.0 * half_mm * along, second = corner + 2.0 * half_mm * across;
+  auto square = vtkSmartPointer<vtkPlaneSource>::New();
+  square->SetOrigin(corner.x(), corner.y(), corner.z());
+  square->SetPoint1(first.x(), first.y(), first.z());
+  square->SetPoint2(second.x(), second.y(), second.z());
+  return square;
+}
+
 }  // namespace
 
 struct PeopleOverlay::Impl {
@@ -91,7 +108,10 @@ struct PeopleOverlay::Impl {
   struct Drawn {
     Annotation annotation;
     std::vector<Vec3> points_mm;
-    vtkSmartPointer<vtkTubeFilter> tube;       // of a line
+    vtkSmartPointer<vtkTubeFilter> tube;      // of a line and of an axis
+    vtkSmartPointer<vtkSphereSource> target;  // of an axis
+    vtkSmartPointer<vtkAppendPolyData> with_target;
+    vtkSmartPointer<vtkPlaneSource> plane;
     vtkSmartPointer<vtkActor> solid, through;  // the same shape: hidden by the bone, and drawn over it
     Words words;
     std::optional<Vec3> normal;  // at a pointer's point
@@ -114,6 +134,7 @@ struct PeopleOverlay::Impl {
       : bone(*b.left), window(w), normal_at(std::move(n)), layer(w, b) {}
 
   Drawn make(const Annotation& annotation);
+  vtkAlgorithmOutput* shape_of(Drawn& one);
   void add(const Drawn& one);
   void remove(const Drawn& one);
   void place(Drawn& one);
@@ -185,28 +206,54 @@ std::string PeopleOverlay::Impl::words_of(const Annotation& annotation) const {
   return annotation.words.empty() ? name->second : name->second + ": " + annotation.words;
 }
 
+// The shape before it is placed.
+vtkAlgorithmOutput* PeopleOverlay::Impl::shape_of(Drawn& one) {
+  switch (one.annotation.kind) {
+    case AnnotationKind::pointer:
+      return arrow->GetOutputPort();
+    case AnnotationKind::label:
+      return ball->GetOutputPort();
+    case AnnotationKind::plane:
+      one.plane = rectangle_about(one.points_mm);
+      return one.plane->GetOutputPort();
+    case AnnotationKind::line:
+    case AnnotationKind::axis:
+      break;
+  }
+  vtkNew<vtkPoints> points;
+  vtkNew<vtkCellArray> cells;
+  cells->InsertNextCell(static_cast<int>(one.points_mm.size()));
+  for (const Vec3& point : one.points_mm) cells->InsertCellPoint(points->InsertNextPoint(point.data()));
+  vtkNew<vtkPolyData> line;
+  line->SetPoints(points);
+  line->SetLines(cells);
+  one.tube = vtkSmartPointer<vtkTubeFilter>::New();
+  one.tube->SetInputData(line);
+  one.tube->SetNumberOfSides(10);
+  one.tube->CappingOn();
+  if (one.annotation.kind == AnnotationKind::line) return one.tube->GetOutputPort();
+  // A ball marks the depth.
+  one.target = vtkSmartPointer<vtkSphereSource>::New();
+  one.target->SetCenter(one.points_mm.back().data());
+  one.target->SetRadius(kDot / kTube * one.tube->GetRadius());
+  one.target->SetThetaResolution(20);
+  one.target->SetPhiResolution(20);
+  one.with_target = vtkSmartPointer<vtkAppendPolyData>::New();
+  one.with_target->AddInputConnection(one.tube->GetOutputPort());
+  one.with_target->AddInputConnection(one.target->GetOutputPort());
+  return one.with_target->GetOutputPort();
+}
+
 PeopleOverlay::Impl::Drawn PeopleOverlay::Impl::make(const Annotation& annotation) {
   Drawn one;
   one.annotation = annotation;
-  for (const auto& point : annotation.points) one.points_mm.push_back(from_steps(point));
-  vtkAlgorithmOutput* shape =
-      annotation.kind == AnnotationKind::pointer ? arrow->GetOutputPort() : ball->GetOutputPort();
-  if (annotation.kind == AnnotationKind::line) {
-    vtkNew<vtkPoints> points;
-    vtkNew<vtkCellArray> cells;
-    cells->InsertNextCell(static_cast<int>(one.points_mm.size()));
-    for (const Vec3& point : one.points_mm) cells->InsertCellPoint(points->InsertNextPoint(point.data()));
-    vtkNew<vtkPolyData> line;
-    line->SetPoints(points);
-    line->SetLines(cells);
-    one.tube = vtkSmartPointer<vtkTubeFilter>::New();
-    one.tube->SetInputData(line);
-    one.tube->SetNumberOfSides(10);
-    one.tube->CappingOn();
-    shape = one.tube->GetOutputPort();
-  }
-  one.solid = shape_actor(shape, annotation.colour, 1.0);
-  one.through = shape_actor(shape, annotation.colour, kThrough);
+  one.points_mm = points_mm(annotation);
+  vtkAlgorithmOutput* shape = shape_of(one);
+  const bool plane = annotation.kind == AnnotationKind::plane;
+  one.solid = shape_actor(shape, annotation.colour, plane ? kPlane : 1.0);
+  one.through = shape_actor(shape, annotation.colour, plane ? kThroughPlane : kThrough);
+  if (plane)
+    for (vtkActor* actor : {one.solid.Get(), one.through.Get()}) actor->GetProperty()->SetBackfaceCulling(0);
   one.words = words_in(kLabelText, kLight);
   const Rgb c = rgb(annotation.colour);
   for (vtkTextActor* text : one.words) {
@@ -344,12 +391,17 @@ void PeopleOverlay::Impl::place(Drawn& one) {
   const double px_mm = std::max(1e-6, mm_per_px(at));
   Vec3 beside = at;
   vtkNew<vtkMatrix4x4> matrix;
-  if (one.annotation.kind == AnnotationKind::line) {
+  if (one.annotation.kind == AnnotationKind::plane) {
+    beside = one.points_mm[1];
+  } else if (one.tube) {
     beside = one.points_mm.back();
     const Vec3& middle = one.points_mm[one.points_mm.size() / 2];
     const double radius_mm = kTube * std::max(1e-6, mm_per_px(middle));
     // Rebuilt only if the difference is visible.
-    if (std::abs(one.tube->GetRadius() / radius_mm - 1.0) > 0.1) one.tube->SetRadius(radius_mm);
+    if (std::abs(one.tube->GetRadius() / radius_mm - 1.0) > 0.1) {
+      one.tube->SetRadius(radius_mm);
+      if (one.target) one.target->SetRadius(kDot / kTube * radius_mm);
+    }
   } else if (one.annotation.kind == AnnotationKind::label) {
     for (int i = 0; i < 3; ++i) {
       matrix->SetElement(i, i, kDot * px_mm);

@@ -1,9 +1,6 @@
 #include "viewer_client/scene/stroke.hpp"
 
 #include <algorithm>
-#include <cmath>
-
-#include "common/tools/cut_body.hpp"
 
 namespace osteon {
 
@@ -35,18 +32,6 @@ void keep_between(const std::vector<Vec3>& points, std::size_t first, std::size_
 }
 
 }  // namespace
-
-std::array<std::int32_t, 3> in_steps(const Vec3& point_mm) {
-  constexpr double kMost = 1 << 30;
-  std::array<std::int32_t, 3> steps{};
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    const double step = std::round(point_mm[static_cast<Eigen::Index>(axis)] / kQuantum_mm);
-    steps[axis] = static_cast<std::int32_t>(std::clamp(step, -kMost, kMost));
-  }
-  return steps;
-}
-
-Vec3 from_steps(const std::array<std::int32_t, 3>& point) { return kQuantum_mm * Vec3(point[0], point[1], point[2]); }
 
 std::vector<Vec3> simplified(const std::vector<Vec3>& points, double tolerance_mm) {
   if (points.size() < 3) return points;

@@ -1,16 +1,11 @@
-// A line that the user draws freehand on the bone, and the conversion of points to the format of annotations.
+// A line that the user draws freehand on the bone.
 #pragma once
-#include <array>
-#include <cstdint>
+#include <cstddef>
 #include <vector>
 
 #include "common/geometry/pose.hpp"
 
 namespace osteon {
-
-// Bone frame, in steps of 2^-10 mm, as in Annotation. Points beyond 2^30 steps are clamped.
-[[nodiscard]] std::array<std::int32_t, 3> in_steps(const Vec3& point_mm);
-[[nodiscard]] Vec3 from_steps(const std::array<std::int32_t, 3>& point);
 
 // A line through some of the points, including both ends. No point is farther from the line than `tolerance_mm`
 // (Douglas and Peucker 1973).

@@ -52,6 +52,39 @@ TEST_F(PeoplePicture, ALineIsSeenInItsColourAlongItsPointsAndVanishes) {
   EXPECT_EQ(differing_pixels(with({}), bare_), 0);
 }
 
+// Seen from the front: an axis from left to right, with a ball at its target.
+TEST_F(PeoplePicture, AnAxisIsALineWithAMarkAtItsTarget) {
+  const double before_mm = -kRadius_mm - 2.0;
+  const Vec3 entry(-8, before_mm, 0), target(8, before_mm, 0);
+  const Image image = with({mark(1, AnnotationKind::axis, {entry, target})});
+  for (const double x : {-7.0, 0.0, 7.0}) EXPECT_TRUE(greenish(at(image, {x, before_mm, 0}))) << x;
+  const auto height_px = [&](const Vec3& point) {
+    const auto [x, y] = seen(point);
+    int green = 0;
+    for (int row = y - 20; row <= y + 20; ++row) {
+      const auto& c = image.at(x, row);
+      green += greenish(Vec3(c[0], c[1], c[2])) ? 1 : 0;
+    }
+    return green;
+  };
+  EXPECT_GT(height_px(target), 1.5 * height_px({0, before_mm, 0}));
+  EXPECT_LE(height_px(entry), height_px({0, before_mm, 0}));
+  EXPECT_EQ(differing_pixels(with({}), bare_), 0);
+}
+
+TEST_F(PeoplePicture, APlaneIsATranslucentRectangleFromBothSides) {
+  const double before_mm = -kRadius_mm - 2.0;
+  const Vec3 first(-15, before_mm, 0), second(15, before_mm, 0), up(-15, before_mm, 20), down(-15, before_mm, -20);
+  const Vec3 inside(5, before_mm, 5), outside(0, before_mm, 16);
+  for (const Vec3& third : {up, down}) {
+    const Image image = with({mark(1, AnnotationKind::plane, {first, second, third})});
+    const Vec3 tinted = at(image, inside), bone = at(bare_, inside);
+    EXPECT_GT(tinted.y() - tinted.x(), bone.y() - bone.x() + 10.0);
+    EXPECT_FALSE(greenish(tinted)) << "the bone is seen through it";
+    EXPECT_EQ(at(image, outside), at(bare_, outside)) << "30 mm high, about its line";
+  }
+}
+
 TEST_F(PeoplePicture, WhatLiesBehindTheBoneShowsThroughItALittle) {
   const auto line_at = [](double y) { return mark(1, AnnotationKind::line, {{-5, y, 0}, {5, y, 0}}); };
   const double in_front_mm = -kRadius_mm - 1.0, behind_mm = 40.0;

@@ -68,11 +68,5 @@ TEST(Stroke, AHandThatDoesNotMoveDrawsNothing) {
   EXPECT_EQ(stroke.line(1024).size(), 2u);
 }
 
-TEST(Steps, AreParts1024OfAMillimetre) {
-  EXPECT_EQ(in_steps(Vec3(1, -2.5, 0)), (std::array<std::int32_t, 3>{1024, -2560, 0}));
-  EXPECT_EQ(from_steps({1024, -2560, 512}), Vec3(1, -2.5, 0.5));
-  EXPECT_EQ(in_steps(Vec3(1e30, -1e30, 0.0)), (std::array<std::int32_t, 3>{1 << 30, -(1 << 30), 0}));
-}
-
 }  // namespace
 }  // namespace osteon

@@ -187,7 +187,9 @@ Annotation sample_line() {
 TEST(Wire, AnAnnotationComesBackWhole) {
   const Annotation pointer{.points = {{7, 8, 9}}};
   const Annotation label{.kind = AnnotationKind::label, .points = {{7, 8, 9}}, .words = "nerve", .colour = 0};
-  for (const Annotation& one : {sample_line(), pointer, label}) {
+  const Annotation axis{.kind = AnnotationKind::axis, .points = {{0, 0, 0}, {0, 0, -30720}}, .words = "screw"};
+  const Annotation plane{.kind = AnnotationKind::plane, .points = {{0, 0, 0}, {1024, 0, 0}, {0, 1024, 0}}};
+  for (const Annotation& one : {sample_line(), pointer, label, axis, plane}) {
     v1::Annotation parsed;
     ASSERT_TRUE(parsed.ParseFromString(wire::to_wire(one).SerializeAsString()));
     const auto back = wire::from_wire(parsed);
@@ -205,7 +207,7 @@ TEST(Wire, RefusesBadAnnotationsByTheNameOfTheField) {
     EXPECT_NE(back.error().message.find(field), std::string::npos) << back.error().message;
   };
   refused([](v1::Annotation& a) { a.clear_kind(); }, "kind");
-  refused([](v1::Annotation& a) { a.set_kind(static_cast<v1::AnnotationKind>(4)); }, "kind");
+  refused([](v1::Annotation& a) { a.set_kind(static_cast<v1::AnnotationKind>(6)); }, "kind");
   refused([](v1::Annotation& a) { a.add_points(1); }, "points");
   refused([](v1::Annotation& a) { a.clear_points(); }, "points");
   refused([](v1::Annotation& a) { a.set_kind(v1::ANNOTATION_KIND_POINTER); }, "points");

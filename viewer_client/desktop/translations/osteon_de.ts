@@ -594,6 +594,22 @@
         <source>not simulated</source>
         <translation>nicht simuliert</translation>
     </message>
+    <message>
+        <source>Angle to the plan</source>
+        <translation>Winkel zum Plan</translation>
+    </message>
+    <message>
+        <source>Beside the plan</source>
+        <translation>Neben dem Plan</translation>
+    </message>
+    <message>
+        <source>Depth left</source>
+        <translation>Resttiefe</translation>
+    </message>
+    <message>
+        <source>%1°</source>
+        <translation>%1°</translation>
+    </message>
 </context>
 <context>
     <name>ImagingHistogram</name>
@@ -1505,6 +1521,185 @@
     <message>
         <source>The folder of a CT</source>
         <translation>Ordner eines CT</translation>
+    </message>
+    <message>
+        <source>&amp;Plan</source>
+        <translation>&amp;Planung</translation>
+    </message>
+</context>
+<context>
+    <name>PlanBar</name>
+    <message>
+        <source>Planned axes and planes</source>
+        <translation>Geplante Achsen und Ebenen</translation>
+    </message>
+    <message>
+        <source>The tool is compared with this one. Its first point is where the slices go.</source>
+        <translation>Mit ihr wird das Instrument verglichen. Die Schnitte gehen durch ihren ersten Punkt.</translation>
+    </message>
+    <message>
+        <source>Nothing is planned</source>
+        <translation>Nichts ist geplant</translation>
+    </message>
+    <message>
+        <source>Draw an &amp;axis</source>
+        <translation>&amp;Achse zeichnen</translation>
+    </message>
+    <message>
+        <source>The entry, then the target, by two clicks on the slices or on the bone</source>
+        <translation>Eintritt, dann Ziel, durch zwei Klicks auf die Schnitte oder den Knochen</translation>
+    </message>
+    <message>
+        <source>Axis</source>
+        <translation>Achse</translation>
+    </message>
+    <message>
+        <source>Draw a &amp;plane</source>
+        <translation>&amp;Ebene zeichnen</translation>
+    </message>
+    <message>
+        <source>Both ends of its line. The plane goes straight into the picture</source>
+        <translation>Beide Enden ihrer Linie. Die Ebene geht gerade in das Bild hinein</translation>
+    </message>
+    <message>
+        <source>Plane</source>
+        <translation>Ebene</translation>
+    </message>
+    <message>
+        <source>Point at the &amp;cross of the slices</source>
+        <translation>Punkt am &amp;Kreuz der Schnitte</translation>
+    </message>
+    <message>
+        <source>The next point of what is being drawn, without the mouse</source>
+        <translation>Der nächste Punkt dessen, was gezeichnet wird, ohne Maus</translation>
+    </message>
+    <message>
+        <source>The name of the chosen axis or plane</source>
+        <translation>Der Name der gewählten Achse oder Ebene</translation>
+    </message>
+    <message>
+        <source>&amp;Delete</source>
+        <translation>&amp;Löschen</translation>
+    </message>
+    <message>
+        <source>Removes the chosen axis or plane</source>
+        <translation>Entfernt die gewählte Achse oder Ebene</translation>
+    </message>
+    <message>
+        <source>Deleted.</source>
+        <translation>Gelöscht.</translation>
+    </message>
+    <message>
+        <source>Delete</source>
+        <translation>Löschen</translation>
+    </message>
+    <message>
+        <source>&amp;Undo in the plan</source>
+        <translation>In der Planung &amp;rückgängig</translation>
+    </message>
+    <message>
+        <source>Takes back your last change of the plan</source>
+        <translation>Nimmt Ihre letzte Änderung der Planung zurück</translation>
+    </message>
+    <message>
+        <source>Undone in the plan.</source>
+        <translation>In der Planung rückgängig gemacht.</translation>
+    </message>
+    <message>
+        <source>Undo</source>
+        <translation>Rückgängig</translation>
+    </message>
+    <message>
+        <source>&amp;Save the plan…</source>
+        <translation>Planung &amp;speichern…</translation>
+    </message>
+    <message>
+        <source>The axes as a file with which a simulated surgeon drills them</source>
+        <translation>Die Achsen als Datei, mit der ein simulierter Chirurg sie bohrt</translation>
+    </message>
+    <message>
+        <source>Click the entry, on the bone or on a slice.</source>
+        <translation>Klicken Sie den Eintritt an, auf dem Knochen oder einem Schnitt.</translation>
+    </message>
+    <message>
+        <source>Click one end of the plane&apos;s line, on the bone or on a slice.</source>
+        <translation>Klicken Sie ein Ende der Linie der Ebene an, auf dem Knochen oder einem Schnitt.</translation>
+    </message>
+    <message>
+        <source>Choose first whether to draw an axis or a plane.</source>
+        <translation>Wählen Sie zuerst, ob Sie eine Achse oder eine Ebene zeichnen.</translation>
+    </message>
+    <message>
+        <source>The second point is too near to the first one. Click farther away.</source>
+        <translation>Der zweite Punkt ist dem ersten zu nahe. Klicken Sie weiter entfernt.</translation>
+    </message>
+    <message>
+        <source>Click the target, where the tip is to stop.</source>
+        <translation>Klicken Sie das Ziel an, wo die Spitze enden soll.</translation>
+    </message>
+    <message>
+        <source>Click the other end of the plane&apos;s line.</source>
+        <translation>Klicken Sie das andere Ende der Linie der Ebene an.</translation>
+    </message>
+    <message>
+        <source>Drawn. Drag its ends on the slices to move them.</source>
+        <translation>Gezeichnet. Ziehen Sie die Enden auf den Schnitten, um sie zu verschieben.</translation>
+    </message>
+    <message>
+        <source>Moved.</source>
+        <translation>Verschoben.</translation>
+    </message>
+    <message>
+        <source>Draw an axis or a plane first, or choose one.</source>
+        <translation>Zeichnen Sie zuerst eine Achse oder Ebene, oder wählen Sie eine.</translation>
+    </message>
+    <message>
+        <source>Name in the plan</source>
+        <translation>Name in der Planung</translation>
+    </message>
+    <message>
+        <source>Its name</source>
+        <translation>Bezeichnung</translation>
+    </message>
+    <message>
+        <source>This name is too long. Give a shorter one.</source>
+        <translation>Dieser Name ist zu lang. Wählen Sie einen kürzeren.</translation>
+    </message>
+    <message>
+        <source>Renamed.</source>
+        <translation>Umbenannt.</translation>
+    </message>
+    <message>
+        <source>Axis %1</source>
+        <translation>Achse %1</translation>
+    </message>
+    <message>
+        <source>Plane %1</source>
+        <translation>Ebene %1</translation>
+    </message>
+    <message>
+        <source>Draw an axis first: a simulated surgeon drills axes.</source>
+        <translation>Zeichnen Sie zuerst eine Achse: Ein simulierter Chirurg bohrt Achsen.</translation>
+    </message>
+    <message>
+        <source>Save the plan</source>
+        <translation>Planung speichern</translation>
+    </message>
+    <message>
+        <source>Plans (*.json)</source>
+        <translation>Pläne (*.json)</translation>
+    </message>
+    <message>
+        <source>Saved %1.</source>
+        <translation>%1 ist gespeichert.</translation>
+    </message>
+    <message>
+        <source>Re&amp;name…</source>
+        <translation>&amp;Umbenennen…</translation>
+    </message>
+    <message>
+        <source>Rename…</source>
+        <translation>Umbenennen…</translation>
     </message>
 </context>
 <context>

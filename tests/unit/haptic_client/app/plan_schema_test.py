@@ -27,6 +27,7 @@ VALID = [
      "entry": POINT},
     {"action": "drill", "tool": "drill-3.2", "hand": "expert", "push_n": 29.0, "entry": POINT,
      "irrigation": True, "suction": False},
+    {"action": "drill", "entry": {"point_mm": [1.0, 2.0, 3.0], "target_mm": [1.0, 2.0, -20.0]}},
     {"action": "drill", "hand": "rig", "feed_mm_per_s": 1.0, "beyond_mm": 5.0, "entry": {"beside_last_mm": [6.0, 0.0]}},
     {"action": "drill", "guide": True, "wear": 2.0, "law": "chi"},
     {"action": "drill", "tool": "pin-1", "to_mm": 20.0, "leave": True, "entry": POINT},

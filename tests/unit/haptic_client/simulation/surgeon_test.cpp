@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <numbers>
+#include <string>
 
 #include "haptic_client/simulation/free_hand.hpp"
 #include "tests/unit/haptic_client/bench.hpp"
@@ -165,6 +166,29 @@ TEST(Plan, HasADigestOfItsOwn) {
   };
   EXPECT_EQ(by_hand("top"), by_hand("top"));
   EXPECT_NE(by_hand("top"), by_hand("bottom"));
+}
+
+// The bone begins at z = 0. The depth counts from there, wherever on the axis the plan's point lies.
+TEST(Plan, ADrillStopsAtTheTargetOfItsEntry) {
+  const Case bone = block_case();
+  PlanStep step = straight_down("drill-3.2", HandKind::expert);
+  step.entry.target_mm = Vec3(0.1, -0.2, 7.5);
+  for (const double entry_mm : {-4.0, 0.0, 3.0}) {
+    step.entry.point_mm = Vec3(0.1, -0.2, entry_mm);
+    const auto ready = make_ready({step}, bone);
+    ASSERT_TRUE(ready) << ready.error().message;
+    EXPECT_NEAR(ready->steps[0].asked_mm(), 7.5, 1e-3) << entry_mm;
+  }
+  step.to_mm = 3.0;
+  EXPECT_EQ(make_ready({step}, bone)->steps[0].asked_mm(), 3.0) << "to_mm says otherwise";
+  step.to_mm = 0.0;
+  const auto refused = [&](double target_mm) {
+    step.entry.target_mm = Vec3(0.1, -0.2, target_mm);
+    const auto ready = make_ready({step}, bone);
+    return ready ? std::string() : ready.error().message;
+  };
+  EXPECT_NE(refused(-1.0).find("entry.target_mm lies before the bone"), std::string::npos);
+  EXPECT_NE(refused(1000.0).find("entry.target_mm is deeper"), std::string::npos);
 }
 
 }  // namespace
