@@ -72,9 +72,7 @@ Result<std::string> run_islands(const ShownScan& a, const StopSignal& stop) {
   if (!a.edits.empty()) {
     auto edits = read_edits(a.edits);
     if (!edits) return tl::unexpected(edits.error());
-    // Of the others, nothing changes the islands.
-    std::erase_if(*edits, [](const LabelEdit& edit) { return edit.kind != EditKind::box; });
-    options.edits = std::move(*edits);
+    options.edits = std::move(*edits);  // only a box among them changes the islands
     options.edits_file = a.edits;
   }
   Bar bar(stop, "finding");

@@ -19,7 +19,7 @@ namespace osteon {
 namespace {
 
 constexpr double kLeastBrush_mm = 0.1, kMostBrush_mm = 50.0, kFirstBrush_mm = 3.0, kBrushStep_mm = 0.5;
-constexpr int kLongestBoneName = 30, kNameWidth_px = 90;
+constexpr int kLongestBoneName = 30, kBoneNameWidth_px = 90;
 
 // The bones that a seed or paint makes.
 std::set<int> bones_of(const ImagingEdits& edits) {
@@ -117,7 +117,7 @@ ImagingBoneChoice::ImagingBoneChoice(Events events, QWidget* parent) : QWidget(p
   name_->setAccessibleName(tr("Name of the bone"));
   name_->setToolTip(tr("Name of the bone in the case, such as femur"));
   name_->setMaxLength(kLongestBoneName);
-  name_->setMinimumWidth(kNameWidth_px);
+  name_->setMinimumWidth(kBoneNameWidth_px);
   connect(name_, &QLineEdit::editingFinished, this, [this] {
     const BoneLabel* label = label_of(edits_, bone());
     const QString shown = QString::fromStdString(label != nullptr ? label->name : plain_name(bone()));
