@@ -96,7 +96,7 @@ class Replay {
                 : voxels_around(grid_, from, to, edit.radius_mm);
       const auto in = [&](const Vec3& at) {
         if (flat && std::abs(edit.normal.dot(at - edit.points_mm.front())) >= half_mm - 1e-9) return false;
-        return whole ? edit.normal.dot(at - from) >= 0.0 : to_segment_mm(at, from, to) <= edit.radius_mm + 1e-9;
+        return whole ? edit.normal.dot(at - from) >= -1e-9 : to_segment_mm(at, from, to) <= edit.radius_mm + 1e-9;
       };
       for (int slice = box.first[2]; slice <= box.last[2] && going; ++slice) {
         going = keep_going_(0.0);

@@ -252,7 +252,7 @@ MUTATIONS = [
       "labels lose their numbers", "unit.import", "LabelMaps.*"),
     M("server/import/dicom_segments.cpp", "(bit % 8) & 1U", "(7 - bit % 8) & 1U",
       "the bits of a DICOM segment are read from the highest", "unit.import", "DicomSegments.*"),
-    M("server/import/label_edits.cpp", "edit.normal.dot(at - from) >= 0.0", "edit.normal.dot(at - from) <= 0.0",
+    M("server/import/label_edits.cpp", "edit.normal.dot(at - from) >= -1e-9", "edit.normal.dot(at - from) <= 1e-9",
       "a cut removes the other side", "unit.import", "LabelEdits.APlane*"),
     M("server/import/label_edits.cpp", "if (flat && std::abs(", "if (false && std::abs(",
       "a disc is a ball", "unit.import", "LabelEdits.WithANormal*"),

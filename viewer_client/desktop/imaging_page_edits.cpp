@@ -8,6 +8,7 @@
 #include <QSpinBox>
 #include <algorithm>
 #include <cmath>
+#include <memory>
 #include <utility>
 
 #include "viewer_client/desktop/imaging_page.hpp"

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace osteon {
 
@@ -86,7 +87,7 @@ class Marks {
     for (int z = plane.first[2]; z <= plane.last[2]; ++z)
       for (int y = plane.first[1]; y <= plane.last[1]; ++y)
         for (int x = plane.first[0]; x <= plane.last[0]; ++x)
-          if (correction.normal.dot(scan.position_mm(Vec3(x, y, z)) - correction.points_mm.front()) >= 0.0)
+          if (correction.normal.dot(scan.position_mm(Vec3(x, y, z)) - correction.points_mm.front()) >= -kSameLength_mm)
             change({x, y, z});
   }
   [[nodiscard]] std::vector<std::uint8_t> take() { return std::move(of_pixel_); }

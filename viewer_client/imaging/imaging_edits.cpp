@@ -1,6 +1,7 @@
 #include "viewer_client/imaging/imaging_edits.hpp"
 
 #include <algorithm>
+#include <array>
 #include <bitset>
 #include <charconv>
 #include <cmath>

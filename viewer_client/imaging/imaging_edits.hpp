@@ -1,10 +1,8 @@
 // What a person decides about the bones of a scan, and the same as the edit list of osteon-import.
 #pragma once
-#include <array>
 #include <cstdint>
 #include <memory>
 #include <optional>
-#include <span>
 #include <string>
 #include <vector>
 
