@@ -35,7 +35,7 @@ struct LabelEdit {
   // from the plane through the first point count, so that a ball is a disc in one slice.
   Vec3 normal = Vec3::Zero();
   // Of a label.
-  std::string name;
+  std::string name = {};
   double opacity = 1.0;  // 0 to 1, in pictures of slices
   double minutes = 0.0;  // of a person's work
 };

@@ -37,9 +37,9 @@ enum class CorrectionKind : std::uint8_t { paint, erase, cut };
 // A change by hand of the bones that grew.
 struct Correction {
   CorrectionKind kind = CorrectionKind::paint;
-  int bone = 0;                 // that is painted or cut
-  std::vector<Vec3> points_mm;  // of the stroke, or one of the plane
-  double radius_mm = 0.0;       // of the stroke
+  int bone = 0;                      // that is painted or cut
+  std::vector<Vec3> points_mm = {};  // of the stroke, or one of the plane
+  double radius_mm = 0.0;            // of the stroke
   // A unit vector. Of a cut: the side that goes. Of a stroke: across the only slice that it changes; zero: all slices.
   Vec3 normal = Vec3::Zero();
 };
