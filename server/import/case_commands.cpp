@@ -37,14 +37,15 @@ constexpr const char* kSuggest = "suggest";
 
 struct CaseArguments {
   ScanArguments scan;
-  std::string input, out, title, legend, spacing, unit = "mm", median, threshold;
+  std::string input, out, title, legend, spacing, unit = "mm", threshold;
   std::string keep, grow_by = "volume", window = "400,1800", edges, space = "volume", limits = "100,300";
   std::string rods_of, surface = "half", between_slices = "auto", thin_cortex = "off", contrast = "apart";
   std::optional<std::string> calibration, rods;
   std::string labels, report, truth, edits;
   std::vector<std::string> bone_colours, seeds, label_names;
   std::optional<double> pitch_mm, similar_hu;
-  double gaussian_mm = 0.0, sigma_mm = 1.0, margin_mm = CtOptions{}.margin_mm;
+  FilterArguments filter;
+  double sigma_mm = 1.0, margin_mm = CtOptions{}.margin_mm;
   double density_g_cm3 = 1.9, metal_hu = CtOptions{}.metal_hu;
   bool rescale_hu = false, json = false, separate = false, merge = false, hollow = false, list = false,
        adaptive = false;
@@ -119,11 +120,6 @@ Result<CalibrationOptions> calibration_options(const CaseArguments& a) {
 // Adds the input's name to an error about its content.
 Error about(const std::string& input, const Error& error) {
   return error.code == ErrorCode::cancelled ? error : Error{error.code, input + ": " + error.message};
-}
-
-std::optional<imaging::MedianBox> median_box(const CaseArguments& a) {
-  if (a.median.empty()) return {};
-  return a.median == "slice" ? imaging::MedianBox::slice : imaging::MedianBox::volume;
 }
 
 // The labels of --labels on the voxels of the scan. Nothing without that option.
@@ -216,6 +212,24 @@ Result<std::string> finish_ct(const CtImport& made, ReadScan read, const CtOptio
   return text;
 }
 
+// Seeds of what is no bone grow as a bone whose number nothing else has.
+Result<void> take_outside_seeds(const CaseArguments& a, CtOptions& options) {
+  if (std::ranges::find(options.edits, EditKind::outside, &LabelEdit::kind) == options.edits.end()) return {};
+  if (options.grow.seeds_mm.empty())
+    return bad_input(a.edits + " has a seed outside and none of a bone; write a seed, or give --seed");
+  int outside = imaging::kMostMarkers;
+  while (outside > 0 && std::ranges::find(options.grow.bones, outside) != options.grow.bones.end()) --outside;
+  if (outside == 0) return bad_input(a.edits + " has seeds of too many bones for one outside; remove some");
+  options.grow.outside = outside;
+  options.separate = true;
+  for (const LabelEdit& edit : options.edits) {
+    if (edit.kind != EditKind::outside) continue;
+    options.grow.seeds_mm.push_back(edit.points_mm.front());
+    options.grow.bones.push_back(outside);
+  }
+  return {};
+}
+
 // Reads the edits of --edits. Seeds among them come after those of the command line, and separate the bones.
 Result<void> take_edits(const CaseArguments& a, CtOptions& options) {
   if (a.edits.empty()) return {};
@@ -226,6 +240,8 @@ Result<void> take_edits(const CaseArguments& a, CtOptions& options) {
   int next = static_cast<int>(options.grow.seeds_mm.size()) + 1;
   for (int bone = 1; bone < next; ++bone) options.grow.bones.push_back(bone);
   for (LabelEdit& edit : options.edits) {
+    if (edit.kind == EditKind::box && !a.labels.empty())
+      return bad_input(a.edits + " has a box, which --labels excludes; remove one of them");
     if (edit.kind != EditKind::seed) continue;
     if (!a.keep.empty() || !a.labels.empty())
       return bad_input(a.edits + " has a seed, which --keep and --labels exclude; remove it, or leave them out");
@@ -235,7 +251,7 @@ Result<void> take_edits(const CaseArguments& a, CtOptions& options) {
     options.grow.bones.push_back(edit.bone);
     options.separate = true;
   }
-  return {};
+  return take_outside_seeds(a, options);
 }
 
 Result<std::string> run_ct(const CaseArguments& a, const StopSignal& stop) {
@@ -249,8 +265,8 @@ Result<std::string> run_ct(const CaseArguments& a, const StopSignal& stop) {
   options.hollow = a.hollow;
   options.list_only = a.list;
   options.draw_islands = !a.report.empty();
-  options.median = median_box(a);
-  options.gaussian_mm = a.gaussian_mm;
+  options.median = median_box(a.filter);
+  options.gaussian_mm = a.filter.gaussian_mm;
   for (const std::string& seed : a.seeds) {
     const auto position_mm = parse_seed(seed);
     if (!position_mm) return tl::unexpected(position_mm.error());
@@ -337,8 +353,8 @@ Result<SliceOptions> slice_options(const CaseArguments& a) {
   options.content = a.edges == "canny"      ? SliceContent::canny
                     : a.edges == "gradient" ? SliceContent::gradient
                                             : SliceContent::grey;
-  options.median = median_box(a);
-  options.gaussian_mm = a.gaussian_mm;
+  options.median = median_box(a.filter);
+  options.gaussian_mm = a.filter.gaussian_mm;
   return options;
 }
 
@@ -500,18 +516,6 @@ Result<void> check_free(const std::string& path) {
 
 namespace {
 
-void add_smoothing_options(CLI::App& command, CaseArguments& a) {
-  command
-      .add_option("--median", a.median,
-                  "First replace each voxel by the median of its 3 x 3 neighbours in the slice, or of its 3 x 3 x 3 in "
-                  "the volume: takes out single wrong voxels")
-      ->check(CLI::IsMember({"slice", "volume"}));
-  command
-      .add_option("--gaussian", a.gaussian_mm,
-                  "First smooth the scan with a Gaussian of this sigma, mm: takes out noise")
-      ->check(number_in(0.0, 10.0));
-}
-
 void add_density_options(CLI::App& command, CaseArguments& a) {
   CLI::Option* line = command.add_option("--calibration", a.calibration,
                                          "SLOPE,INTERCEPT of the line from HU to density, g/cm3 per HU and g/cm3 "
@@ -554,7 +558,7 @@ void add_slices_command(CLI::App& app, const std::shared_ptr<CaseArguments>& sha
   CLI::App* slices = app.add_subcommand("slices", "Write the slices of a CT scan, or their edges, as PNG images");
   add_scan_options(*slices, a.scan);
   slices->add_option("--out", a.out, "Folder of the images, made by this command")->required();
-  add_smoothing_options(*slices, a);
+  add_filter_options(*slices, a.filter);
   slices->add_option("--window", a.window, "CENTRE,WIDTH: the HU that become grey; without --edges")
       ->capture_default_str();
   slices
@@ -635,7 +639,8 @@ void add_case_commands(CLI::App& app, std::vector<Command>& commands) {
           ->excludes(list)
           ->excludes(labels_option);
   ct->add_option("--edits", a.edits,
-                 "YAML file of corrections, made in its order: paint, scribble, erase, cut, and further seeds")
+                 "YAML file of corrections, made in its order: paint, scribble, erase, cut, further seeds, seeds "
+                 "outside, a box, and labels")
       ->excludes(list);
   ct->add_option("--truth", a.truth,
                  "Say how well the case agrees with this label map: Dice, and distances of the surfaces, mm")
@@ -665,7 +670,7 @@ void add_case_commands(CLI::App& app, std::vector<Command>& commands) {
       ->check(CLI::IsMember({"apart", "bone"}))
       ->capture_default_str()
       ->excludes(labels_option);
-  add_smoothing_options(*ct, a);
+  add_filter_options(*ct, a.filter);
   ct->add_option("--margin", a.margin_mm, "The case keeps the scan this far around its bones, mm")
       ->check(number_in(0.0, 200.0))
       ->capture_default_str();

@@ -261,8 +261,8 @@ Result<Segmented> segment(imaging::HuVolume scan, const CtOptions& options, cons
   auto work = bones ? Result<ScanRegion>(region_around_all(bones->regions, scan, options))
                     : dense_region(scan, options, keep_going);
   if (!work) return tl::unexpected(work.error());
-  if (const auto painted = painted_voxels(scan, options.edits))
-    widen(*work, region_around(painted->first, painted->last, scan, options));
+  if (const auto reached = reached_voxels(scan, options.edits))
+    widen(*work, region_around(reached->first, reached->last, scan, options));
   Segmented s;
   auto cropped = imaging::cropped(std::move(scan), work->first, work->last, part(keep_going, 0.0, 0.02));
   if (!cropped) return tl::unexpected(cropped.error());
@@ -313,12 +313,25 @@ Result<Segmented> segment(imaging::HuVolume scan, const CtOptions& options, cons
   return s;
 }
 
+// Applies the filters, then the box, so that voxels beside the box count for the filters. Adds to the scan's source
+// what was done. Errors: invalid_input (a box without voxels), cancelled.
+Result<void> prepare_scan(CtScan& scan, const CtOptions& options, const KeepGoing& keep_going) {
+  const auto smoothed = smooth_scan(scan.volume, options, keep_going);
+  if (!smoothed) return tl::unexpected(smoothed.error());
+  scan.source += *smoothed;
+  const auto box = boxed_voxels(scan.volume, options.edits);
+  if (!box) return bad_input(options.edits_file + ", " + box.error().message);
+  if (!*box) return {};
+  auto cropped = imaging::cropped(std::move(scan.volume), (*box)->first, (*box)->last, part(keep_going, 1.0, 1.0));
+  if (!cropped) return tl::unexpected(cropped.error());
+  scan.volume = std::move(*cropped);
+  scan.source += ", a box of it";
+  return {};
+}
+
 // Finds the bones in the scan, and adds to its source what was done. `options`: gets the threshold that was used.
 Result<Segmented> find_bones(CtScan& scan, CtOptions& options, const DensityCalibration& calibration,
                              const KeepGoing& keep_going) {
-  const auto smoothed = smooth_scan(scan.volume, options, part(keep_going, kCalibrateEnd, kSmoothEnd));
-  if (!smoothed) return tl::unexpected(smoothed.error());
-  scan.source += *smoothed;
   std::string reason;
   if (options.suggest_threshold) {
     const auto suggested = suggested_threshold(scan.volume, part(keep_going, kSmoothEnd, kSmoothEnd));
@@ -351,11 +364,14 @@ CaseScan numbered_islands(const Segmented& s) {
 }
 
 Result<CtImport> import_bones(CtScan scan, CtOptions options, const KeepGoing& keep_going) {
-  const imaging::HuVolume geometry = without_values(scan.volume);
-  const double pitch_mm = pitch_mm_of(geometry, options);
-  if (Result<void> sound = check_options(geometry, options, pitch_mm); !sound) return tl::unexpected(sound.error());
+  const imaging::HuVolume whole = without_values(scan.volume);
+  const double pitch_mm = pitch_mm_of(whole, options);
+  if (Result<void> sound = check_options(whole, options, pitch_mm); !sound) return tl::unexpected(sound.error());
   auto calibrated = calibrate_scan(scan.volume, options.calibration, part(keep_going, 0.0, kCalibrateEnd));
   if (!calibrated) return tl::unexpected(calibrated.error());
+  if (auto prepared = prepare_scan(scan, options, part(keep_going, kCalibrateEnd, kSmoothEnd)); !prepared)
+    return tl::unexpected(prepared.error());
+  const imaging::HuVolume geometry = without_values(scan.volume);
   auto s = find_bones(scan, options, calibrated->line, keep_going);
   if (!s) return tl::unexpected(s.error());
   if (!s->found.regions.empty())

@@ -46,14 +46,15 @@ struct CtOptions {
   std::string title = "CT";              // never taken from the scan, whose texts may name a patient
   std::vector<int> keep;                 // islands by number, from 1; empty: the largest that is bone
   bool keep_all = false;
-  bool separate = false;         // bones that touch within the kept islands are bones of their own
-  bool merge = false;            // the kept islands count as one bone
-  bool hollow = false;           // cavities enclosed by bone are not bone
-  std::vector<LabelEdit> edits;  // of the bones, after all else; seeds among them are in `grow`
-  std::string edits_file;        // their name, for errors
-  bool list_only = false;        // find the islands and make no case
-  bool draw_islands = false;     // for a report
-  bool number_islands = false;   // with list_only: CtImport::scan gets their numbers
+  bool separate = false;  // bones that touch within the kept islands are bones of their own
+  bool merge = false;     // the kept islands count as one bone
+  bool hollow = false;    // cavities enclosed by bone are not bone
+  // Of the bones, after all else. Seeds among them are in `grow`. A box among them counts before all else.
+  std::vector<LabelEdit> edits;
+  std::string edits_file;       // their name, for errors
+  bool list_only = false;       // find the islands and make no case
+  bool draw_islands = false;    // for a report
+  bool number_islands = false;  // with list_only: CtImport::scan gets their numbers
   // Taken out of the scan before anything else: outliers by a median, then noise by a Gaussian.
   std::optional<imaging::MedianBox> median;
   double gaussian_mm = 0.0;  // its sigma; 0: none

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/core/bounded_text.hpp"
 #include "common/imaging/watershed.hpp"
 #include "server/import/yaml_fields.hpp"
 
@@ -14,6 +15,8 @@ namespace {
 constexpr std::size_t kMostPoints = 1000;
 constexpr double kLeastRadius_mm = 0.05, kMostRadius_mm = 200.0;
 constexpr int kMostBone = imaging::kMostMarkers;
+constexpr std::size_t kLongestLabelName = 60;  // bytes
+constexpr double kMostMinutes = 1e5;
 constexpr YamlList kEditList{"edits", "edit", "write edits: [{kind: erase, centre_mm: [12.5, -3, 40], radius_mm: 2}]",
                              1000};
 
@@ -25,11 +28,14 @@ struct EditFields {
 
 const std::vector<EditFields>& edit_kinds() {
   static const std::vector<EditFields> all{
-      {"paint", EditKind::paint, {"bone", "centre_mm", "radius_mm"}, {}},
-      {"scribble", EditKind::scribble, {"bone", "points_mm", "radius_mm"}, {}},
-      {"erase", EditKind::erase, {"centre_mm", "radius_mm"}, {"bone"}},
+      {"paint", EditKind::paint, {"bone", "centre_mm", "radius_mm"}, {"normal"}},
+      {"scribble", EditKind::scribble, {"bone", "points_mm", "radius_mm"}, {"normal"}},
+      {"erase", EditKind::erase, {"radius_mm"}, {"centre_mm", "points_mm", "bone", "normal"}},
       {"cut", EditKind::cut, {"bone", "point_mm", "normal"}, {"to_bone"}},
       {"seed", EditKind::seed, {"point_mm"}, {"bone"}},
+      {"outside", EditKind::outside, {"point_mm"}, {}},
+      {"box", EditKind::box, {"corner_mm", "opposite_mm"}, {}},
+      {"label", EditKind::label, {"bone", "name"}, {"opacity", "minutes"}},
   };
   return all;
 }
@@ -57,6 +63,14 @@ Vec3 direction_of(const YAML::Node& node, const std::string& field) {
   return normal.normalized();
 }
 
+std::string label_name_of(const YAML::Node& node) {
+  if (!node.IsScalar() || node.Scalar().empty() || node.Scalar().size() > kLongestLabelName ||
+      bounded_text(node.Scalar()) != node.Scalar())
+    throw YamlFault{"name is not one to " + std::to_string(kLongestLabelName) +
+                    " bytes of plain text; write a short one, such as femur"};
+  return node.Scalar();
+}
+
 void set_field(LabelEdit& edit, const std::string& field, const YAML::Node& node) {
   if (field == "bone")
     edit.bone = bone_of(node, field);
@@ -68,8 +82,14 @@ void set_field(LabelEdit& edit, const std::string& field, const YAML::Node& node
     edit.normal = direction_of(node, field);
   else if (field == "points_mm")
     edit.points_mm = points_of(node, field);
+  else if (field == "name")
+    edit.name = label_name_of(node);
+  else if (field == "opacity")
+    edit.opacity = number_of(node, field, 0.0, 1.0);
+  else if (field == "minutes")
+    edit.minutes = number_of(node, field, 0.0, kMostMinutes);
   else
-    edit.points_mm = {position_of(node, field)};
+    edit.points_mm.push_back(position_of(node, field));  // the two corners of a box have an order of no meaning
 }
 
 LabelEdit edit_of(const YAML::Node& node) {
@@ -89,15 +109,37 @@ LabelEdit edit_of(const YAML::Node& node) {
     if (const std::string& field = entry.first.Scalar(); field != "kind") set_field(edit, field, entry.second);
   if (edit.kind == EditKind::cut && edit.to_bone == edit.bone)
     throw YamlFault{"to_bone is " + std::to_string(edit.bone) + ", as bone is; write another number, or leave it out"};
+  // A bone without a name is called so, and names differ.
+  if (edit.kind == EditKind::label && edit.name.starts_with("bone ") &&
+      edit.name != "bone " + std::to_string(edit.bone))
+    throw YamlFault{"name is " + quoted_value(edit.name) +
+                    ", which only a bone of that number may have; write another"};
+  if (edit.kind == EditKind::erase && node["centre_mm"].IsDefined() == node["points_mm"].IsDefined())
+    throw YamlFault{"erase needs centre_mm or points_mm, and not both; write one of them"};
   return edit;
+}
+
+// What may be there only once.
+void check_against(const std::vector<LabelEdit>& before, const LabelEdit& edit) {
+  for (const LabelEdit& other : before) {
+    if (other.kind != edit.kind) continue;
+    if (edit.kind == EditKind::box) throw YamlFault{"there is a box before it; remove one of them"};
+    if (edit.kind == EditKind::label && other.bone == edit.bone)
+      throw YamlFault{"bone " + std::to_string(edit.bone) + " has a label before it; remove one of them"};
+    if (edit.kind == EditKind::label && other.name == edit.name)
+      throw YamlFault{"name is " + quoted_value(edit.name) + ", as that of another label; write another"};
+  }
 }
 
 }  // namespace
 
 Result<std::vector<LabelEdit>> parse_edits(std::string_view text, const std::string& file_name) {
   std::vector<LabelEdit> edits;
-  const auto parsed =
-      parse_yaml_list(text, file_name, kEditList, [&](const YAML::Node& node) { edits.push_back(edit_of(node)); });
+  const auto parsed = parse_yaml_list(text, file_name, kEditList, [&](const YAML::Node& node) {
+    LabelEdit edit = edit_of(node);
+    check_against(edits, edit);
+    edits.push_back(std::move(edit));
+  });
   if (!parsed) return tl::unexpected(parsed.error());
   return edits;
 }

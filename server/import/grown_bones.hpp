@@ -12,6 +12,7 @@ namespace osteon::import {
 struct GrowOptions {
   std::vector<Vec3> seeds_mm;        // LPS; empty: no growing
   std::vector<int> bones;            // number of each seed's bone if bones are separated; empty: 1, 2, 3, ...
+  int outside = 0;                   // the number in `bones` that is taken away again; 0: none
   std::optional<double> similar_hu;  // to the seed, or to the mean of the region; absent: bone reaches the threshold
   bool adaptive = false;             // to the mean
   imaging::GrowBy by = imaging::GrowBy::volume;

@@ -73,6 +73,7 @@ CaseLabel label_of(const CtOptions& options, const CtSegmentation& found, const 
   else if (!found.merged && bone.number < kMostBoneNumbers)
     add_island(found, bone.number, label.provenance);
   label.provenance.edits = bone.edits;
+  name_label(options.edits, label);
   return label;
 }
 
@@ -85,6 +86,11 @@ LabelProvenance provenance_of(const CtOptions& options) {
   if (!options.grow.seeds_mm.empty()) add_growing(options.grow, provenance);
   if (options.median) provenance.parameters["median_voxels"] = *options.median == imaging::MedianBox::slice ? 9 : 27;
   if (options.gaussian_mm > 0.0) provenance.parameters["gaussian_mm"] = options.gaussian_mm;
+  if (const auto box = std::ranges::find(options.edits, EditKind::box, &LabelEdit::kind); box != options.edits.end())
+    for (std::size_t corner = 0; corner < box->points_mm.size(); ++corner)
+      for (int axis = 0; axis < 3; ++axis)
+        provenance.parameters["box_" + std::to_string(corner + 1) + "_" + "xyz"[axis] + "_mm"] =
+            box->points_mm[corner][axis];
   return provenance;
 }
 
@@ -145,6 +151,14 @@ Result<CaseScan> kept_scan(imaging::HuVolume volume, KnownVoxels known, const im
       }
   }
   return scan;
+}
+
+void name_label(std::span<const LabelEdit> edits, CaseLabel& label) {
+  for (const LabelEdit& edit : edits) {
+    if (edit.kind != EditKind::label || edit.bone != label.value) continue;
+    label.name = edit.name;
+    label.provenance.parameters["minutes"] = edit.minutes;
+  }
 }
 
 void list_labels(const CaseScan& scan, const CtOptions& options, const CtSegmentation& found, CaseInfo& info) {

@@ -32,6 +32,9 @@ struct KnownVoxels {
 // Lists the labels and tissues that kept_scan() gives.
 void list_labels(const CaseScan& scan, const CtOptions& options, const CtSegmentation& found, CaseInfo& info);
 
+// What a person says of a label: its name, and how long the work took. Nothing without such an edit.
+void name_label(std::span<const LabelEdit> edits, CaseLabel& label);
+
 // The labels of a label volume without HU, as far as its box reaches. Error: cancelled.
 [[nodiscard]] Result<CaseScan> kept_scan(const imaging::LabelVolume& volume, const KeepGoing& keep_going);
 void list_labels(const LabelLegend& legend, CaseInfo& info);

@@ -32,6 +32,16 @@ double to_segment_mm(const Vec3& at, const Vec3& from, const Vec3& to) {
   return (at - from - t * along).norm();
 }
 
+// Half the extent of a voxel along a direction.
+double half_voxel_mm(const imaging::HuVolume& grid, const Vec3& along) {
+  return 0.5 * (grid.directions.transpose() * along).cwiseAbs().dot(grid.spacing_mm);
+}
+
+// Whether apply_edits() takes an edit.
+bool changes_labels(EditKind kind) {
+  return kind == EditKind::paint || kind == EditKind::scribble || kind == EditKind::erase || kind == EditKind::cut;
+}
+
 // Voxels within `radius_mm` of the box around two points, as far as they are in the grid. Empty: last < first.
 imaging::VoxelBox voxels_around(const imaging::HuVolume& grid, const Vec3& a_mm, const Vec3& b_mm, double radius_mm) {
   const Vec3 a = grid.voxel(a_mm), b = grid.voxel(b_mm);
@@ -77,13 +87,16 @@ class Replay {
   std::int64_t play(const LabelEdit& edit, EditEffect& effect) {
     std::int64_t covered = 0;
     const bool whole = edit.kind == EditKind::cut;
+    const bool flat = !whole && edit.normal != Vec3::Zero();
+    const double half_mm = flat ? half_voxel_mm(grid_, edit.normal) : 0.0;
     bool going = true;
     each_segment(edit, [&](const Vec3& from, const Vec3& to) {
       const imaging::VoxelBox box =
           whole ? imaging::VoxelBox{{0, 0, 0}, {grid_.dims[0] - 1, grid_.dims[1] - 1, grid_.dims[2] - 1}}
                 : voxels_around(grid_, from, to, edit.radius_mm);
       const auto in = [&](const Vec3& at) {
-        return whole ? edit.normal.dot(at - from) >= 0.0 : to_segment_mm(at, from, to) <= edit.radius_mm + 1e-9;
+        if (flat && std::abs(edit.normal.dot(at - edit.points_mm.front())) >= half_mm - 1e-9) return false;
+        return whole ? edit.normal.dot(at - from) >= -1e-9 : to_segment_mm(at, from, to) <= edit.radius_mm + 1e-9;
       };
       for (int slice = box.first[2]; slice <= box.last[2] && going; ++slice) {
         going = keep_going_(0.0);
@@ -118,12 +131,18 @@ class Replay {
 }  // namespace
 
 std::string_view name_of(EditKind kind) {
-  constexpr std::array<std::string_view, 5> kNames{"paint", "scribble", "erase", "cut", "seed"};
+  constexpr std::array<std::string_view, 8> kNames{"paint", "scribble", "erase", "cut",
+                                                   "seed",  "outside",  "box",   "label"};
   return kNames.at(static_cast<std::size_t>(kind));
 }
 
 std::string edit_text(const LabelEdit& edit) {
   std::string text(name_of(edit.kind));
+  if (edit.kind == EditKind::label)
+    return text + " bone " + std::to_string(edit.bone) + " " + edit.name + ", opacity " + number_text(edit.opacity) +
+           ", " + number_text(edit.minutes) + " min";
+  if (edit.kind == EditKind::box)
+    return text + " from " + point_text(edit.points_mm.front()) + " to " + point_text(edit.points_mm.back()) + " mm";
   if (edit.bone != 0) text += " bone " + std::to_string(edit.bone);
   if (edit.kind == EditKind::cut)
     text += edit.to_bone != 0 ? ", to bone " + std::to_string(edit.to_bone) : std::string(", removed");
@@ -137,15 +156,15 @@ std::string edit_text(const LabelEdit& edit) {
   } else {
     text += " mm";
   }
-  if (edit.kind == EditKind::cut) text += ", normal " + point_text(edit.normal);
+  if (edit.normal != Vec3::Zero()) text += ", normal " + point_text(edit.normal);
   if (edit.radius_mm > 0.0) text += ", radius " + number_text(edit.radius_mm) + " mm";
   return text;
 }
 
-std::optional<imaging::VoxelBox> painted_voxels(const imaging::HuVolume& grid, std::span<const LabelEdit> edits) {
+std::optional<imaging::VoxelBox> reached_voxels(const imaging::HuVolume& grid, std::span<const LabelEdit> edits) {
   std::optional<imaging::VoxelBox> all;
   for (const LabelEdit& edit : edits) {
-    if (edit.kind != EditKind::paint && edit.kind != EditKind::scribble) continue;
+    if (!changes_labels(edit.kind) || edit.kind == EditKind::cut) continue;
     each_segment(edit, [&](const Vec3& from, const Vec3& to) {
       const imaging::VoxelBox box = voxels_around(grid, from, to, edit.radius_mm);
       if (holds_no_voxel(box)) return;
@@ -159,6 +178,24 @@ std::optional<imaging::VoxelBox> painted_voxels(const imaging::HuVolume& grid, s
   return all;
 }
 
+Result<std::optional<imaging::VoxelBox>> boxed_voxels(const imaging::HuVolume& grid, std::span<const LabelEdit> edits) {
+  constexpr double kSameVoxel = 1e-6;  // of a step: corners at centres of voxels belong to the box
+  const auto found = std::ranges::find(edits, EditKind::box, &LabelEdit::kind);
+  if (found == edits.end()) return std::optional<imaging::VoxelBox>();
+  const Vec3 a = grid.voxel(found->points_mm.front()), b = grid.voxel(found->points_mm.back());
+  imaging::VoxelBox box;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const int i = static_cast<int>(axis);
+    const double last = grid.dims[axis] - 1.0;
+    box.first[axis] = static_cast<int>(std::clamp(std::ceil(std::min(a[i], b[i]) - kSameVoxel), 0.0, last + 1.0));
+    box.last[axis] = static_cast<int>(std::clamp(std::floor(std::max(a[i], b[i]) + kSameVoxel), -1.0, last));
+  }
+  if (holds_no_voxel(box))
+    return bad_edit(static_cast<std::size_t>(found - edits.begin()), *found,
+                    "it holds no voxel of the scan; write two corners with voxels of the scan between them");
+  return std::optional(box);
+}
+
 Result<std::vector<EditEffect>> apply_edits(const imaging::HuVolume& grid, std::span<const LabelEdit> edits,
                                             imaging::VoxelMask& labels, const KeepGoing& keep_going) {
   OSTEON_CHECK(grid.dims == labels.dims);
@@ -169,7 +206,7 @@ Result<std::vector<EditEffect>> apply_edits(const imaging::HuVolume& grid, std::
   Replay replay(grid, labels, within);
   for (; index < edits.size(); ++index) {
     const LabelEdit& edit = edits[index];
-    if (edit.kind == EditKind::seed) continue;
+    if (!changes_labels(edit.kind)) continue;
     const bool changes_bone = edit.kind == EditKind::cut || (edit.kind == EditKind::erase && edit.bone != 0);
     if (changes_bone && !replay.has(edit.bone))
       return bad_edit(index, edit,

@@ -17,17 +17,27 @@ namespace osteon::import {
 enum class EditKind {
   paint,     // the voxels of a ball become `bone`
   scribble,  // those within the radius of a polyline become `bone`
-  erase,     // the voxels of a ball that are `bone`, or any bone if that is 0, become none
+  erase,     // those of a ball or polyline that are `bone`, or any bone if that is 0, become none
   cut,       // the voxels of `bone` on the side of a plane to which the normal points become `to_bone`, or none if 0
-  seed,      // a seed of `bone`, or of the next bone if that is 0; the segmentation takes it, not apply_edits()
+  // The segmentation takes these, not apply_edits().
+  seed,     // a seed of `bone`, or of the next bone if that is 0
+  outside,  // a seed of what is no bone
+  box,      // only the voxels between two opposite corners count, along the axes of the scan
+  label,    // what a person says of `bone`
 };
 
 struct LabelEdit {
   EditKind kind = EditKind::paint;
   int bone = 0, to_bone = 0;
-  std::vector<Vec3> points_mm;  // centre, point of the plane, seed, or corners of the polyline; LPS
+  std::vector<Vec3> points_mm;  // centre, point of the plane, seed, or corners of the polyline or box; LPS
   double radius_mm = 0.0;
-  Vec3 normal = Vec3::Zero();  // a unit vector
+  // A unit vector. Of paint, scribble and erase, where zero is none: only voxels whose centre is less than half a voxel
+  // from the plane through the first point count, so that a ball is a disc in one slice.
+  Vec3 normal = Vec3::Zero();
+  // Of a label.
+  std::string name = {};
+  double opacity = 1.0;  // 0 to 1, in pictures of slices
+  double minutes = 0.0;  // of a person's work
 };
 
 [[nodiscard]] std::string_view name_of(EditKind kind);
@@ -40,9 +50,14 @@ struct EditEffect {
   std::array<std::int64_t, 256> gained{}, lost{};  // voxels of each label; 0: of no bone
 };
 
-// The voxels that edits may turn into bone, within the grid; nothing if no edit can.
-[[nodiscard]] std::optional<imaging::VoxelBox> painted_voxels(const imaging::HuVolume& grid,
+// The voxels that paint, scribbles and erasers reach, within the grid; nothing if none does.
+[[nodiscard]] std::optional<imaging::VoxelBox> reached_voxels(const imaging::HuVolume& grid,
                                                               std::span<const LabelEdit> edits);
+
+// The voxels whose centres lie between the corners of the edits' box; nothing without one. Error: invalid_input (there
+// is no such voxel).
+[[nodiscard]] Result<std::optional<imaging::VoxelBox>> boxed_voxels(const imaging::HuVolume& grid,
+                                                                    std::span<const LabelEdit> edits);
 
 // Changes `labels`, which lie on the voxels of `grid`. A voxel belongs to a ball or a side if its centre does; the
 // surface of the ball and the plane itself belong to them. Errors: invalid_input (a ball or polyline without a voxel of

@@ -9,6 +9,7 @@
 #include <system_error>
 #include <utility>
 
+#include "common/runtime/number_option.hpp"
 #include "server/import/command.hpp"
 #include "server/import/dicom_reader.hpp"
 #include "server/import/found_files.hpp"
@@ -213,6 +214,23 @@ void add_scan_options(CLI::App& command, ScanArguments& a, const std::string& na
       ->group(given);
   command.add_option(dashes + "skip-bytes", a.skip_bytes, "Before the first raw number of each file (default: 0)")
       ->group(given);
+}
+
+void add_filter_options(CLI::App& command, FilterArguments& a) {
+  command
+      .add_option("--median", a.median,
+                  "First replace each voxel by the median of its 3 x 3 neighbours in the slice, or of its 3 x 3 x 3 in "
+                  "the volume: takes out single wrong voxels")
+      ->check(CLI::IsMember({"slice", "volume"}));
+  command
+      .add_option("--gaussian", a.gaussian_mm,
+                  "First smooth the scan with a Gaussian of this sigma, mm: takes out noise")
+      ->check(number_in(0.0, 10.0));
+}
+
+std::optional<imaging::MedianBox> median_box(const FilterArguments& a) {
+  if (a.median.empty()) return {};
+  return a.median == "slice" ? imaging::MedianBox::slice : imaging::MedianBox::volume;
 }
 
 Result<CtScan> read_scan(const ScanArguments& a, const KeepGoing& reading) {

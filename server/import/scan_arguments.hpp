@@ -6,6 +6,7 @@
 #include <string_view>
 
 #include "common/core/keep_going.hpp"
+#include "common/imaging/smoothing.hpp"
 #include "server/import/ct_scan.hpp"
 
 namespace CLI {  // the library's
@@ -33,6 +34,14 @@ void add_scan_options(CLI::App& command, ScanArguments& arguments, const std::st
 
 // Error invalid_input: the input is a case file, which must be unpacked first. The error says how.
 [[nodiscard]] Result<void> check_no_case_file(const std::string& input);
+
+// The filters that come before anything else.
+struct FilterArguments {
+  std::string median;  // slice, volume, or empty: none
+  double gaussian_mm = 0.0;
+};
+void add_filter_options(CLI::App& command, FilterArguments& arguments);
+[[nodiscard]] std::optional<imaging::MedianBox> median_box(const FilterArguments& arguments);
 
 // What an input is that has one scan and no series; empty for others.
 [[nodiscard]] std::string_view name_of_one_scan(const std::string& input, const KeepGoing& keep_going);

@@ -10,7 +10,9 @@
 #include "common/imaging/island_kinds.hpp"
 #include "common/runtime/number_option.hpp"
 #include "server/import/command.hpp"
+#include "server/import/ct_case.hpp"
 #include "server/import/ct_import.hpp"
+#include "server/import/edit_file.hpp"
 #include "server/import/raw_nrrd.hpp"
 #include "server/import/scan_arguments.hpp"
 
@@ -22,7 +24,8 @@ constexpr std::size_t kMostNumbered = 254;
 
 struct ShownScan {
   ScanArguments scan;
-  std::string out;
+  FilterArguments filter;
+  std::string out, edits;
   double threshold_hu = CtOptions{}.threshold_hu;
 };
 
@@ -34,8 +37,13 @@ Result<void> check_raw_file(const std::string& file) {
 Result<std::string> run_export_scan(const ShownScan& a, const StopSignal& stop) {
   if (auto good = check_raw_file(a.out); !good) return tl::unexpected(good.error());
   Bar bar(stop, "reading");
-  const auto scan = read_scan(a.scan, bar.stage(0.0, 0.9));
+  auto scan = read_scan(a.scan, bar.stage(0.0, 0.7));
   if (!scan) return tl::unexpected(scan.error());
+  CtOptions options;
+  options.median = median_box(a.filter);
+  options.gaussian_mm = a.filter.gaussian_mm;
+  if (auto smoothed = smooth_scan(scan->volume, options, bar.stage(0.7, 0.9)); !smoothed)
+    return tl::unexpected(smoothed.error());
   if (auto written = write_raw_nrrd(scan->volume, scan->volume.values, a.out, bar.stage(0.9, 1.0)); !written)
     return tl::unexpected(written.error());
   bar.stage(1.0, 1.0)(1.0);
@@ -60,10 +68,16 @@ std::string islands_json(const CtSegmentation& found) {
 
 Result<std::string> run_islands(const ShownScan& a, const StopSignal& stop) {
   if (auto good = check_raw_file(a.out); !good) return tl::unexpected(good.error());
+  CtOptions options;
+  if (!a.edits.empty()) {
+    auto edits = read_edits(a.edits);
+    if (!edits) return tl::unexpected(edits.error());
+    options.edits = std::move(*edits);  // only a box among them changes the islands
+    options.edits_file = a.edits;
+  }
   Bar bar(stop, "finding");
   auto scan = read_scan(a.scan, bar.stage(0.0, 0.3));
   if (!scan) return tl::unexpected(scan.error());
-  CtOptions options;
   options.threshold_hu = a.threshold_hu;
   options.list_only = true;
   options.number_islands = true;
@@ -91,6 +105,7 @@ void add_scan_commands(CLI::App& app, std::vector<Command>& commands) {
   CLI::App* scan = app.add_subcommand("export-scan", "Write the HU of a scan as one file for other programs");
   add_scan_options(*scan, shared->scan);
   scan->add_option("FILE", shared->out, "File to write: .nrrd, not compressed")->required();
+  add_filter_options(*scan, shared->filter);
   commands.push_back({scan, [shared](const StopSignal& stop) { return run_export_scan(*shared, stop); }});
 
   const auto found = std::make_shared<ShownScan>();
@@ -102,6 +117,7 @@ void add_scan_commands(CLI::App& app, std::vector<Command>& commands) {
   islands->add_option("--threshold", found->threshold_hu, "Voxels at or above it are bone, HU")
       ->check(number_in(-1000.0, 4000.0))
       ->capture_default_str();
+  islands->add_option("--edits", found->edits, "YAML file of corrections, whose box limits the search");
   commands.push_back({islands, [found](const StopSignal& stop) { return run_islands(*found, stop); }});
 }
 

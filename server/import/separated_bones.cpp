@@ -6,6 +6,7 @@
 #include <numeric>
 
 #include "common/imaging/separation.hpp"
+#include "server/import/kept_scan.hpp"
 
 namespace osteon::import {
 namespace {
@@ -23,7 +24,9 @@ std::string effect_text(const LabelEdit& edit, const EditEffect& effect, double 
   const auto bone_cm3 = [&](const Counts& counts) {
     return static_cast<double>(std::accumulate(counts.begin() + 1, counts.end(), std::int64_t{0})) * voxel_cm3;
   };
-  if (edit.kind == EditKind::seed) return edit_text(edit);
+  if (edit.kind == EditKind::seed || edit.kind == EditKind::outside || edit.kind == EditKind::box ||
+      edit.kind == EditKind::label)
+    return edit_text(edit);
   std::array<char, 64> text{};
   std::snprintf(text.data(), text.size(), ": %.3f cm3 added, %.3f cm3 taken", bone_cm3(effect.gained),
                 bone_cm3(effect.lost));
@@ -94,6 +97,10 @@ Result<imaging::SurfaceLevel> finish_bones(const imaging::HuVolume& volume, cons
         imaging::separate_bones(volume, bones, options.threshold_hu, seeds, part(keep_going, 0.0, separated_at));
     if (!separated) return tl::unexpected(separated.error());
     bones = std::move(*separated);
+    if (options.grow.outside != 0) {
+      std::ranges::replace(bones.values, static_cast<std::uint8_t>(options.grow.outside), std::uint8_t{0});
+      if (std::ranges::all_of(bones.values, [](std::uint8_t b) { return b == 0; })) return nothing_left(options);
+    }
   }
   imaging::SurfaceLevel level{options.threshold_hu};
   const auto bone_voxels = [&] { return std::ranges::count_if(bones.values, [](std::uint8_t b) { return b != 0; }); };
@@ -128,8 +135,13 @@ Result<std::vector<std::string>> edit_labels(const imaging::HuVolume& grid, cons
                          ? *known
                          : CaseLabel{value, "bone " + std::to_string(value), LabelKind::bone, {"edits", {}, {}}});
     labels.back().provenance.edits = edits_of(options, *effects, number);
+    name_label(options.edits, labels.back());
     placed.cm3.push_back(static_cast<double>(after[number]) * voxel_cm3);
   }
+  for (std::size_t i = 0; i < labels.size(); ++i)
+    for (std::size_t j = 0; j < i; ++j)
+      if (labels[i].name == labels[j].name)
+        return bad_input(options.edits_file + " names two labels " + labels[i].name + "; write another name");
   placed.labels = std::move(labels);
   if (std::ranges::none_of(placed.labels, is_carved, &CaseLabel::kind)) return nothing_left(options);
   return effect_texts(options, *effects, voxel_cm3);

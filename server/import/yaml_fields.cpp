@@ -31,6 +31,7 @@ Result<void> parse_yaml_list(std::string_view text, const std::string& file_name
                              const std::function<void(const YAML::Node&)>& on_entry) {
   const std::string name = list.name, remedy = list.remedy;
   std::size_t number = 0;
+  int line_of_entry = 0;
   try {
     const YAML::Node root = YAML::Load(std::string(text));
     if (!root.IsMap() || !root[name] || !root[name].IsSequence() || root[name].size() == 0)
@@ -42,11 +43,13 @@ Result<void> parse_yaml_list(std::string_view text, const std::string& file_name
       throw YamlFault{name + " has more than " + std::to_string(list.most) + " entries; remove some"};
     for (const YAML::Node& node : root[name]) {
       ++number;
+      line_of_entry = node.Mark().line + 1;
       on_entry(node);
     }
     return {};
   } catch (const YamlFault& fault) {
-    const std::string where = number > 0 ? std::string(", ") + list.entry + " " + std::to_string(number) : "";
+    const std::string where =
+        number > 0 ? ", line " + std::to_string(line_of_entry) + ", " + list.entry + " " + std::to_string(number) : "";
     return bad_input(file_name + where + ": " + fault.what);
   } catch (const YAML::Exception& error) {
     const std::string line = error.mark.is_null() ? "" : ", line " + std::to_string(error.mark.line + 1);

@@ -57,8 +57,12 @@ void read_and_replay_edits(std::span<const std::uint8_t> data) {
   for (const import::LabelEdit& edit : *edits) {
     OSTEON_CHECK(edit.bone >= 0 && edit.bone < 255 && edit.to_bone >= 0 && edit.to_bone < 255);
     for (const Vec3& point : edit.points_mm) OSTEON_CHECK(point.allFinite());
-    OSTEON_CHECK(import::edit_text(edit).size() <= 200);
+    OSTEON_CHECK(import::edit_text(edit).size() <= 200 && edit.name.size() <= 60);
   }
+  if (const auto box = import::boxed_voxels(grid, *edits); !box)
+    expect_bounded(box.error());
+  else if (*box)
+    OSTEON_CHECK((*box)->count() >= 1 && (*box)->count() <= grid.count());
   const auto effects = import::apply_edits(grid, *edits, labels, [](double) { return true; });
   if (!effects) return expect_bounded(effects.error());
 }
@@ -139,7 +143,12 @@ Target edits_target() {
                      "  - {kind: scribble, bone: 2, points_mm: [[0, 0, 0], [3, 4, 40]], radius_mm: 0.6}\n"
                      "  - {kind: cut, bone: 1, point_mm: [1, 2, 20], normal: [0, 0.5, 1], to_bone: 3}\n"
                      "  - {kind: erase, bone: 2, centre_mm: [0, 0, 0], radius_mm: 2}\n"
-                     "  - {kind: seed, point_mm: [1, 2, 20], bone: 4}\n")});
+                     "  - {kind: seed, point_mm: [1, 2, 20], bone: 4}\n"),
+       bytes_of_text("edits:\n"
+                     "  - {kind: box, corner_mm: [0, 1, 0], opposite_mm: [3, 4, 40]}\n"
+                     "  - {kind: outside, point_mm: [1, 2, 20]}\n"
+                     "  - {kind: erase, points_mm: [[0, 0, 0], [3, 4, 40]], radius_mm: 0.6, normal: [0, 0, 1]}\n"
+                     "  - {kind: label, bone: 1, name: femur, opacity: 0.5, minutes: 2.5}\n")});
 }
 
 Target landmarks_target() {

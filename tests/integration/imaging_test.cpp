@@ -8,7 +8,6 @@
 #include <QLabel>
 #include <QListWidget>
 #include <QPushButton>
-#include <QSettings>
 #include <QSlider>
 #include <QSpinBox>
 #include <QTest>
@@ -16,20 +15,16 @@
 #include <QWheelEvent>
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <filesystem>
 #include <string>
 
 #include "common/volume/case.hpp"
-#include "server/import/dicom_writer.hpp"
-#include "tests/integration/two_balls.hpp"
-#include "tests/integration/window_bench.hpp"
+#include "tests/integration/imaging_bench.hpp"
 #include "tests/support/content.hpp"
 #include "tests/support/process.hpp"
 #include "tests/support/size_limit.hpp"
 #include "viewer_client/desktop/imaging_histogram.hpp"
 #include "viewer_client/desktop/imaging_page.hpp"
-#include "viewer_client/desktop/language.hpp"
 #include "viewer_client/desktop/library.hpp"
 
 namespace osteon {
@@ -38,36 +33,10 @@ namespace {
 namespace fs = std::filesystem;
 using namespace std::chrono_literals;
 using test::children;
-using test::kApart_mm;
 using test::two_balls;
 
-class ImagingTest : public test::WindowBench {
+class ImagingTest : public test::ImagingBench {
  protected:
-  void SetUp() override {
-    QSettings().setValue("tour/seen", true);
-    speak("en");
-    WindowBench::SetUp();
-  }
-  // A folder of DICOM files, written once for each name.
-  [[nodiscard]] static fs::path series(const std::string& name, const imaging::HuVolume& scan) {
-    const fs::path folder = desk_->temp() / name;
-    if (!fs::exists(folder)) {
-      const auto written = import::write_dicom_series(scan, folder, [](double) { return true; });
-      EXPECT_TRUE(written) << written.error().message;
-    }
-    return folder;
-  }
-  template <class Widget>
-  [[nodiscard]] Widget& part(const char* name) const {
-    auto* found = window_->findChild<Widget*>(name);
-    if (found == nullptr) ADD_FAILURE() << name;
-    return *found;
-  }
-  [[nodiscard]] ImagingPlane& plane(const char* name) const {
-    auto* found = dynamic_cast<ImagingPlane*>(window_->findChild<QWidget*>(name));
-    if (found == nullptr) ADD_FAILURE() << name;
-    return *found;
-  }
   [[nodiscard]] QListWidget& islands() const { return part<QListWidget>("islands"); }
   [[nodiscard]] bool idle() const { return !part<QPushButton>("imaging_cancel").isVisible(); }
   [[nodiscard]] bool found(int count) const { return idle() && islands().isVisible() && islands().count() == count; }
@@ -89,12 +58,6 @@ class ImagingTest : public test::WindowBench {
     ++clicks_;
     QTest::mouseClick(list.viewport(), Qt::LeftButton, {}, list.visualItemRect(list.item(0)).center());
   }
-  // The middle voxel of the ball on the patient's left (1) or right (-1).
-  [[nodiscard]] static std::array<int, 3> ball(int side) {
-    const Vec3 voxel = two_balls().voxel(Vec3(side * kApart_mm, 0, 0));
-    return {static_cast<int>(std::lround(voxel.x())), static_cast<int>(std::lround(voxel.y())), 12};
-  }
-  [[nodiscard]] std::string words() const { return label("imaging_words").toStdString(); }
   [[nodiscard]] std::vector<bool> ticks() const {
     std::vector<bool> all;
     for (int i = 0; i < islands().count(); ++i) all.push_back(islands().item(i)->checkState() == Qt::Checked);

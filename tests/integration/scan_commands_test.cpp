@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <fstream>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
@@ -92,6 +93,31 @@ TEST_F(ScanCommands, IslandsAreListedAndNumbered) {
   EXPECT_EQ(none.exit_code, 1);
   EXPECT_NE(none.err.find("no voxel reaches the bone threshold of 1001 HU"), std::string::npos) << none.err;
   EXPECT_FALSE(fs::exists(folder_ / "none.nrrd"));
+}
+
+// A single wrong voxel is gone, and the others of its neighbourhood stay.
+TEST_F(ScanCommands, AScanIsWrittenAsItIsAfterAFilter) {
+  imaging::HuVolume wrong = balls_;
+  const std::size_t at = wrong.index(30, 4, 12);  // in muscle
+  wrong.values[at] = 2000;
+  ASSERT_TRUE(import::write_dicom_series(wrong, folder_ / "wrong", [](double) { return true; }));
+  ASSERT_EQ(start({"export-scan", path("wrong"), path("as-is.nrrd")}).exit_code, 0);
+  ASSERT_EQ(start({"export-scan", path("wrong"), path("median.nrrd"), "--median", "volume"}).exit_code, 0);
+  const auto as_is = read_scan_file(folder_ / "as-is.nrrd"), median = read_scan_file(folder_ / "median.nrrd");
+  ASSERT_TRUE(as_is && median);
+  EXPECT_EQ(as_is->values[at], 2000);
+  for (const std::size_t near : {at - 1, at, at + 1}) EXPECT_EQ(median->values[near], kMuscle_hu);
+}
+
+TEST_F(ScanCommands, ABoxLimitsTheIslands) {
+  std::ofstream(folder_ / "box.yaml") << "edits: [{kind: box, corner_mm: [2, -99, -99], opposite_mm: [99, 99, 99]}]";
+  const auto listed = start({"islands", path("ct"), path("islands.nrrd"), "--edits", path("box.yaml")});
+  ASSERT_EQ(listed.exit_code, 0) << listed.err;
+  const auto islands = nlohmann::json::parse(listed.out)["islands"];
+  ASSERT_EQ(islands.size(), 1u) << listed.out;
+  EXPECT_NEAR(islands[0]["centre_mm"][0].get<double>(), kApart_mm, 0.5 * balls_.spacing_mm.x());
+  std::ofstream(folder_ / "box.yaml") << "edits:\n  - {kind: box, corner_mm: [2, 0, 0]}";
+  refused({"islands", path("ct"), path("none.nrrd"), "--edits", path("box.yaml")}, "line 2, edit 1: opposite_mm");
 }
 
 TEST_F(ScanCommands, EachSeriesHasAPicture) {

@@ -1,6 +1,7 @@
 #include "viewer_client/desktop/imaging_page.hpp"
 
 #include <QComboBox>
+#include <QDoubleSpinBox>
 #include <QFileDialog>
 #include <QFormLayout>
 #include <QGridLayout>
@@ -22,6 +23,7 @@ namespace osteon {
 
 namespace {
 
+constexpr double kLeastGaussian_mm = 0.05, kMostGaussian_mm = 10.0, kGaussianStep_mm = 0.1, kFirstGaussian_mm = 0.5;
 constexpr int kThresholdPause_ms = 600, kThumbnail_px = 96, kListWidth_px = 250;
 constexpr std::array kImagingWindows{kBoneWindow, kSoftTissueWindow, kWideWindow};
 enum ImagingStackPage { kNothingOpen, kSeriesPage, kWorkPage };
@@ -85,6 +87,7 @@ ImagingSteps::Events ImagingPage::step_events() {
           },
           [this](const std::vector<ListedSeries>& series) { show_series(series); },
           [this](ShownScan scan, const HuHistogram& histogram) { show_scan(std::move(scan), histogram); },
+          [this](ShownScan scan, const HuHistogram& histogram) { show_filtered(std::move(scan), histogram); },
           [this](std::vector<ListedIsland> list, IslandMap map) { show_islands(std::move(list), std::move(map)); },
           [this](const std::filesystem::path& bone) {
             events_.busy(false);
@@ -132,30 +135,71 @@ QBoxLayout* ImagingPage::make_head() {
 QBoxLayout* ImagingPage::make_work() {
   auto* row = new QHBoxLayout;
   row->setContentsMargins(0, 0, 0, 0);
-  row->addWidget(make_planes(), 1);
+  row->addLayout(make_planes(), 1);
   row->addLayout(make_side());
   return row;
 }
 
-QWidget* ImagingPage::make_planes() {
-  auto* all = new QWidget;
-  auto* grid = new QGridLayout(all);
-  grid->setContentsMargins(0, 0, 0, 0);
+QBoxLayout* ImagingPage::make_planes() {
+  auto* all = new QVBoxLayout;
+  tools_ = new ImagingTools([this] { follow_tools(); });
+  all->addWidget(tools_);
+  auto* grid = new QGridLayout;
   for (std::size_t i = 0; i < planes_.size(); ++i) {
-    planes_[i] = new ImagingPlane(kPlanes[i], scene_,
-                                  {[this](const std::array<int, 3>& voxel) { look_at(voxel); },
-                                   [this](const std::array<int, 3>& voxel) { point_at(voxel); },
-                                   [this](const std::array<int, 3>& voxel) { keep_at(voxel); },
-                                   [this](const HuWindow& window) { change_window(window); }});
+    planes_[i] = new ImagingPlane(
+        kPlanes[i], scene_,
+        {[this](const std::array<int, 3>& voxel) { look_at(voxel); },
+         [this](const std::array<int, 3>& voxel) { point_at(voxel); },
+         [this](const std::array<int, 3>& voxel) { keep_at(voxel); },
+         [this](const HuWindow& window) { change_window(window); },
+         [this](const PlaneAxes& axes, const std::array<int, 3>& voxel) { begin_drag(axes, voxel); },
+         [this](const std::array<int, 3>& voxel) { drag_to(voxel); }, [this](bool keep) { end_drag(keep); },
+         [this](int notches) { tools_->turn_radius(notches); }});
     grid->addWidget(planes_[i], static_cast<int>(i) / 2, static_cast<int>(i) % 2);
   }
+  grid->addWidget(make_corner(), 1, 1);
+  for (int at = 0; at < 2; ++at) grid->setRowStretch(at, 1), grid->setColumnStretch(at, 1);
+  all->addLayout(grid, 1);
+  return all;
+}
+
+QWidget* ImagingPage::make_corner() {
+  auto* corner = new QWidget;
+  auto* column = new QVBoxLayout(corner);
+  column->setContentsMargins(0, 0, 0, 0);
   readout_ = new QLabel;
   readout_->setObjectName("readout");
   readout_->setWordWrap(true);
   readout_->setAlignment(Qt::AlignTop | Qt::AlignLeft);
-  grid->addWidget(readout_, 1, 1);
-  for (int at = 0; at < 2; ++at) grid->setRowStretch(at, 1), grid->setColumnStretch(at, 1);
-  return all;
+  column->addWidget(readout_, 1);
+  choice_ = new ImagingBoneChoice({[this](int bone, const QString& name) { name_bone(bone, name); },
+                                   [this](int bone, int percent) { fade_bone(bone, percent); }});
+  column->addWidget(choice_);
+  return corner;
+}
+
+void ImagingPage::add_filter(QFormLayout& form) {
+  filter_ = new QComboBox;
+  filter_->setObjectName("filter");
+  filter_->setAccessibleName(tr("Filter of the scan"));
+  filter_->setToolTip(tr("A median takes out single wrong voxels, a Gaussian takes out noise"));
+  filter_->addItems({tr("None"), tr("Median, slice"), tr("Median, volume"), tr("Gaussian")});
+  connect(filter_, QOverload<int>::of(&QComboBox::activated), this, [this] { take_filter(); });
+  gaussian_ = new QDoubleSpinBox;
+  gaussian_->setObjectName("gaussian");
+  gaussian_->setAccessibleName(tr("Sigma of the Gaussian"));
+  gaussian_->setToolTip(tr("Sigma of the Gaussian. Half a voxel to one voxel is usual."));
+  gaussian_->setRange(kLeastGaussian_mm, kMostGaussian_mm);
+  gaussian_->setDecimals(2);
+  gaussian_->setSingleStep(kGaussianStep_mm);
+  gaussian_->setSuffix(tr(" mm"));
+  gaussian_->setValue(kFirstGaussian_mm);
+  gaussian_->setKeyboardTracking(false);
+  connect(gaussian_, QOverload<double>::of(&QDoubleSpinBox::valueChanged), this, [this] { take_filter(); });
+  auto* row = new QHBoxLayout;
+  row->addWidget(filter_, 1);
+  row->addWidget(gaussian_);
+  form.addRow(tr("Smoothing"), row);
 }
 
 QBoxLayout* ImagingPage::make_side() {
@@ -177,6 +221,7 @@ QBoxLayout* ImagingPage::make_side() {
   threshold_->setValue(static_cast<int>(history_.now().threshold_hu));
   connect(threshold_, QOverload<int>::of(&QSpinBox::valueChanged), this, [this](int hu) { preview_threshold(hu); });
   form->addRow(tr("Threshold"), threshold_);
+  add_filter(*form);
   column->addLayout(form);
   histogram_ = new ImagingHistogram(
       {[this](int hu) { threshold_->setValue(hu); }, [this](const HuWindow& window) { change_window(window); }});
@@ -235,8 +280,13 @@ void ImagingPage::open_source(const QString& source) {
   series_.clear();
   series_list_->clear();
   history_ = {};
-  found_hu_.reset();
+  found_.reset();
+  shown_filter_ = {};
+  drag_.reset();
   scene_.look = {};
+  scene_.seeds.clear();
+  tools_->reset();
+  choice_->follow({});
   island_list_->clear();
   readout_->clear();
   const QSignalBlocker quiet(threshold_);
@@ -289,6 +339,17 @@ void ImagingPage::show_scan(ShownScan scan, const HuHistogram& histogram) {
   change_window(kBoneWindow);
   for (ImagingPlane* plane : planes_) plane->begin();
   planes_[0]->setFocus();
+  work_.start();
+  find_islands();
+}
+
+void ImagingPage::show_filtered(ShownScan scan, const HuHistogram& histogram) {
+  scene_.scan = std::move(scan);
+  shown_filter_ = searched_.filter;
+  histogram_->set_histogram(histogram);
+  refresh_planes();
+  point_at(scene_.crosshair);
+  // The same geometry, but perhaps the user wants another filter by now.
   find_islands();
 }
 
@@ -298,16 +359,20 @@ void ImagingPage::find_islands() {
     wants_islands_ = true;
     return steps_.cancel();
   }
+  searched_ = wanted();
+  if (shown_filter_ != searched_.filter) {
+    show_work(tr("Filtering the scan"));
+    return steps_.filter(searched_.filter);
+  }
   show_work(tr("Finding the parts of bone"));
-  searched_hu_ = history_.now().threshold_hu;
-  steps_.find(scene_.scan.geometry, searched_hu_);
+  steps_.find(scene_.scan.geometry, history_.now());
 }
 
 void ImagingPage::show_islands(std::vector<ListedIsland> list, IslandMap map) {
   islands_ = std::move(list);
   scene_.islands = std::move(map);
-  const bool first = !found_hu_;
-  found_hu_ = searched_hu_;
+  const bool first = !found_;
+  found_ = searched_;
   if (first) show_largest_bone();
   end_work(tr("Double-click a bone, or tick it in the list, and make it."));
   // A threshold that the user sets just now stays, and its parts are found next.
@@ -318,8 +383,7 @@ void ImagingPage::show_largest_bone() {
   const auto bone = std::ranges::find(islands_, "bone", &ListedIsland::kind);
   if (bone == islands_.end()) return;
   const auto centre = voxel_of(scene_.scan.geometry, bone->centre_mm).value_or(scene_.crosshair);
-  if (const auto seed = scene_.islands.seed_near(scene_.scan, bone->number, found_hu_.value_or(0.0), centre))
-    look_at(*seed);
+  if (const auto seed = scene_.islands.seed_near(scene_.scan, bone->number, found_hu(), centre)) look_at(*seed);
 }
 
 void ImagingPage::look_at(const std::array<int, 3>& voxel) {
@@ -357,84 +421,13 @@ void ImagingPage::preview_threshold(int hu) {
   enable_parts();
 }
 
-void ImagingPage::take_threshold() {
-  ImagingEdits edits = history_.now();
-  edits.threshold_hu = threshold_->value();
-  history_.apply(std::move(edits));
-}
-
-void ImagingPage::apply_threshold() {
-  take_threshold();
-  follow_edits();
-}
-
-bool ImagingPage::kept(int island) const {
-  return std::ranges::any_of(history_.now().seeds_mm, [&](const Vec3& seed) {
-    const auto voxel = voxel_of(scene_.scan.geometry, seed);
-    return voxel && scene_.islands.number(*voxel) == island;
-  });
-}
-
-void ImagingPage::keep_at(const std::array<int, 3>& voxel) {
-  if (!keep_->isEnabled()) return;
-  const int island = scene_.islands.number(voxel);
-  const auto seed = island == 0 ? std::optional<std::array<int, 3>>()
-                                : scene_.islands.seed_near(scene_.scan, island, found_hu_.value_or(0.0), voxel);
-  if (!seed) return words_->setText(tr("There is no bone at the crosshair. Move it into a tinted part."));
-  ImagingEdits edits = history_.now();
-  const Vec3 at_mm = centre_of(scene_.scan.geometry, *seed);
-  if (std::ranges::find(edits.seeds_mm, at_mm) != edits.seeds_mm.end()) return;
-  edits.seeds_mm.push_back(at_mm);
-  history_.apply(std::move(edits));
-  words_->setText(tr("Part %1 is kept.").arg(island));
-  follow_edits();
-}
-
-void ImagingPage::change_island(const QListWidgetItem* item) {
-  const auto row = static_cast<std::size_t>(island_list_->row(item));
-  if (filling_ || row >= islands_.size()) return;
-  const ListedIsland& island = islands_[row];
-  const bool keep = item->checkState() == Qt::Checked;
-  if (keep == kept(island.number)) return;
-  ImagingEdits edits = history_.now();
-  if (keep) {
-    const auto centre = voxel_of(scene_.scan.geometry, island.centre_mm);
-    const auto seed = scene_.islands.main_seed_near(scene_.scan, island.number, found_hu_.value_or(0.0),
-                                                    centre.value_or(scene_.crosshair));
-    if (seed) edits.seeds_mm.push_back(centre_of(scene_.scan.geometry, *seed));
-  } else {
-    std::erase_if(edits.seeds_mm, [&](const Vec3& seed) {
-      const auto voxel = voxel_of(scene_.scan.geometry, seed);
-      return voxel && scene_.islands.number(*voxel) == island.number;
-    });
-  }
-  history_.apply(std::move(edits));
-  follow_edits();
-}
-
-void ImagingPage::follow_edits() {
-  const QSignalBlocker quiet(threshold_);
-  threshold_->setValue(static_cast<int>(history_.now().threshold_hu));
-  histogram_->set_limits(history_.now().threshold_hu, scene_.look.window);
-  threshold_timer_.stop();
-  if (history_.now().threshold_hu != found_hu_) {
-    scene_.look.threshold_hu = history_.now().threshold_hu;
-    find_islands();
-  } else {
-    scene_.look.threshold_hu.reset();
-    refresh_list();
-  }
-  refresh_planes();
-  enable_parts();
-}
-
 void ImagingPage::refresh_list() {
+  refresh_look();
   filling_ = true;
   if (island_list_->count() != static_cast<int>(islands_.size())) island_list_->clear();
   for (std::size_t i = 0; i < islands_.size(); ++i) {
     const bool keep = kept(islands_[i].number);
-    const Tint tint = tint_of(islands_[i].number, keep);
-    scene_.look.islands[static_cast<std::size_t>(islands_[i].number)] = tint;
+    const Tint tint = scene_.look.islands[static_cast<std::size_t>(islands_[i].number)];
     auto* item = island_list_->item(static_cast<int>(i));
     if (item == nullptr) item = new QListWidgetItem(island_list_);
     item->setText(island_text(islands_[i]));
@@ -453,32 +446,27 @@ void ImagingPage::enable_parts() {
   const bool free = !steps_.busy(), making = steps_.making();
   // Until the user has stopped to change the threshold, the parts are of another one than the page shows.
   const bool changing = threshold_timer_.isActive();
-  const bool found =
-      free && !changing && scene_.open() && !islands_.empty() && history_.now().threshold_hu == found_hu_;
+  const bool found = free && !changing && scene_.open() && !islands_.empty() && wanted() == found_;
   const QString wait = tr("osteon-import is at work. Wait for it, or cancel it.");
   const QString none = free ? tr("Choose a threshold that bone reaches.") : wait;
   set_enabled(*back_, !making, wait);
   set_enabled(*threshold_, !making, wait);
+  set_enabled(*filter_, !making, wait);
+  const bool gaussian = filter_->currentIndex() == kGaussianRow;
+  set_enabled(*gaussian_, !making && gaussian, making ? wait : tr("Choose the Gaussian first."));
+  set_enabled(*tools_, found, none);
+  set_enabled(*choice_, found, none);
   // After a search that was cancelled or failed.
-  find_->setVisible(free && !changing && scene_.open() && history_.now().threshold_hu != found_hu_);
+  find_->setVisible(free && !changing && scene_.open() && wanted() != found_);
   set_enabled(*keep_, found, none);
   set_enabled(*island_list_, found, none);
   set_enabled(*undo_, !making && (changing || history_.can_undo()), making ? wait : tr("There is nothing to undo."));
   set_enabled(*redo_, !making && history_.can_redo(), making ? wait : tr("There is nothing to redo."));
-  const bool some = std::ranges::any_of(history_.now().seeds_mm, [&](const Vec3& seed) {
-    const auto voxel = scene_.open() ? voxel_of(scene_.scan.geometry, seed) : std::nullopt;
-    return voxel && scene_.islands.number(*voxel) != 0;
+  const bool some = std::ranges::any_of(history_.now().seeds, [&](const KeptSeed& seed) {
+    const auto voxel = scene_.open() ? voxel_of(scene_.scan.geometry, seed.at_mm) : std::nullopt;
+    return voxel && seed.bone != 0 && scene_.islands.number(*voxel) != 0;
   });
   set_enabled(*make_, found && some, found ? tr("Keep a bone first: double-click it, or tick it in the list.") : none);
-}
-
-void ImagingPage::make_bone() {
-  show_work(tr("The bone is being made"));
-  ImagingEdits edits = history_.now();
-  edits.seeds_mm = scene_.islands.moved_seeds(scene_.scan, found_hu_.value_or(0.0), edits.seeds_mm);
-  steps_.make(edits);
-  events_.busy(steps_.making());
-  enable_parts();
 }
 
 }  // namespace osteon

@@ -1,6 +1,7 @@
 // The page on which a person sees a CT, chooses its bones, and makes a case of them.
 #pragma once
 #include <QCoreApplication>
+#include <QElapsedTimer>
 #include <QTimer>
 #include <QWidget>
 #include <array>
@@ -12,10 +13,13 @@
 #include "viewer_client/desktop/imaging_histogram.hpp"
 #include "viewer_client/desktop/imaging_plane.hpp"
 #include "viewer_client/desktop/imaging_steps.hpp"
+#include "viewer_client/desktop/imaging_tools.hpp"
 #include "viewer_client/imaging/edit_history.hpp"
 
 class QBoxLayout;
 class QComboBox;
+class QDoubleSpinBox;
+class QFormLayout;
 class QLabel;
 class QListWidget;
 class QListWidgetItem;
@@ -47,7 +51,9 @@ class ImagingPage : public QWidget {
   [[nodiscard]] ImagingSteps::Events step_events();
   QBoxLayout* make_head();
   QBoxLayout* make_work();
-  QWidget* make_planes();
+  QBoxLayout* make_planes();
+  QWidget* make_corner();
+  void add_filter(QFormLayout& form);
   QBoxLayout* make_side();
   QPushButton* add_button(QBoxLayout& to, const QString& words, const char* name, const QString& tip,
                           std::function<void()> call);
@@ -60,6 +66,7 @@ class ImagingPage : public QWidget {
   void show_series(const std::vector<ListedSeries>& series);
   void read_row(const QListWidgetItem* item);
   void show_scan(ShownScan scan, const HuHistogram& histogram);
+  void show_filtered(ShownScan scan, const HuHistogram& histogram);
   void show_islands(std::vector<ListedIsland> list, IslandMap map);
   void find_islands();
   void show_largest_bone();
@@ -75,10 +82,27 @@ class ImagingPage : public QWidget {
   // A seed at the voxel, or near to it in its island.
   void keep_at(const std::array<int, 3>& voxel);
   void change_island(const QListWidgetItem* item);
+  static constexpr int kGaussianRow = 3;  // of the list of filters
+  void take_filter();
+  void show_filter(const ScanFilter& filter);
+  void follow_tools();
+  void begin_drag(const PlaneAxes& axes, const std::array<int, 3>& voxel);
+  void drag_to(const std::array<int, 3>& voxel);
+  void end_drag(bool keep);
+  void show_drag();
+  void keep_outside(const std::array<int, 3>& voxel);
+  void name_bone(int bone, const QString& name);
+  void fade_bone(int bone, int percent);
+  // Into the history, with the time since the last edit for a bone; 0: for none.
+  void take(ImagingEdits edits, int bone);
+  // The lowest bone that grows in the island of a voxel; 0: none.
+  [[nodiscard]] int bone_at(const std::array<int, 3>& voxel) const;
   [[nodiscard]] bool kept(int island) const;
   // The history has another state now.
   void follow_edits();
   void refresh_list();
+  // What the planes show of the edits.
+  void refresh_look();
   void refresh_planes();
   void enable_parts();
 
@@ -86,8 +110,22 @@ class ImagingPage : public QWidget {
   ImagingScene scene_;
   EditHistory history_;
   std::vector<ListedIsland> islands_;
-  std::optional<double> found_hu_;  // the threshold of the islands; nothing: none were found yet
-  double searched_hu_ = 0.0;        // that of the islands that are being found
+  // What the islands depend on.
+  struct IslandSearch {
+    double threshold_hu = 0.0;
+    ScanFilter filter;
+    std::optional<MarkedBox> box;
+    friend bool operator==(const IslandSearch&, const IslandSearch&) = default;
+  };
+  [[nodiscard]] IslandSearch wanted() const {
+    return {history_.now().threshold_hu, history_.now().filter, history_.now().box};
+  }
+  [[nodiscard]] double found_hu() const { return found_ ? found_->threshold_hu : 0.0; }
+  std::optional<IslandSearch> found_;  // nothing: none were found yet
+  IslandSearch searched_;              // of the islands that are being found
+  ScanFilter shown_filter_;            // of the scan that the planes show
+  std::optional<PlaneDrag> drag_;
+  QElapsedTimer work_;  // since the last edit
   ImagingSteps steps_;
   QString wanted_source_;       // to open when the step at work has ended
   bool wants_islands_ = false;  // the same
@@ -98,8 +136,11 @@ class ImagingPage : public QWidget {
   QLabel *words_, *readout_;
   QProgressBar* progress_;
   QPushButton *cancel_, *back_, *find_, *keep_, *undo_, *redo_, *make_;
-  QComboBox* preset_;
+  QComboBox *preset_, *filter_;
   QSpinBox* threshold_;
+  QDoubleSpinBox* gaussian_;
+  ImagingTools* tools_ = nullptr;
+  ImagingBoneChoice* choice_;
   ImagingHistogram* histogram_;
   std::array<ImagingPlane*, 3> planes_{};
   QTimer threshold_timer_;  // the user has stopped to change the threshold

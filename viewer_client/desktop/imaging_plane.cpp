@@ -18,7 +18,9 @@ namespace {
 
 constexpr int kPlaneMargin_px = 4, kPage = 10;
 constexpr int kWheelStep = 120;  // of Qt, for one notch
-constexpr QColor kCrosshair{90, 230, 140, 170}, kLetter{250, 220, 120};
+constexpr QColor kCrosshair{90, 230, 140, 170}, kLetter{250, 220, 120}, kBoxEdge{90, 200, 255}, kOutside{255, 60, 60};
+constexpr QColor kBrush{255, 255, 255, 200};
+constexpr double kSeedMark_px = 4.0;
 
 const char* name_of(Plane plane) {
   return plane == Plane::axial ? "axial" : plane == Plane::coronal ? "coronal" : "sagittal";
@@ -43,7 +45,7 @@ ImagingPlane::ImagingPlane(Plane plane, const ImagingScene& scene, Events events
   setAccessibleName(title_of(plane));
   setFocusPolicy(Qt::StrongFocus);
   setMouseTracking(true);
-  setToolTip(tr("Left: crosshair. Double click, Enter: keep. Right drag: window. Wheel: slices."));
+  setToolTip(tr("Left: the tool. Double click, Enter: keep. Right drag: window. Wheel: slices."));
   slider_ = new QSlider(Qt::Vertical);
   slider_->setObjectName(QString("slice_") + name_of(plane));
   slider_->setAccessibleName(tr("%1: slice").arg(title_of(plane)));
@@ -56,6 +58,7 @@ ImagingPlane::ImagingPlane(Plane plane, const ImagingScene& scene, Events events
 
 void ImagingPlane::begin() {
   axes_ = axes_of(scene_.scan.geometry, plane_);
+  dragging_ = false;
   const QSignalBlocker quiet(slider_);
   slider_->setRange(0, axes_.slices - 1);
   slider_->setPageStep(kPage);
@@ -100,32 +103,86 @@ void ImagingPlane::paintEvent(QPaintEvent* /*event*/) {
   const QRectF picture(at.left_px, at.top_px, at.width_px, at.height_px);
   painter.setRenderHint(QPainter::SmoothPixmapTransform);
   painter.drawImage(picture, image);
-  const auto [column, row, through] = place_in(axes_, scene_.crosshair);
-  const auto [x, y] = pixel_of(axes_, at, column, row);
-  painter.setPen(kCrosshair);
-  painter.drawLine(QPointF(picture.left(), y), QPointF(picture.right(), y));
-  painter.drawLine(QPointF(x, picture.top()), QPointF(x, picture.bottom()));
+  paint_marks(painter, at);
   // Below the title, which may reach the middle.
   paint_edge_letters(painter, all.toRect().adjusted(0, painter.fontMetrics().height(), 0, 0),
                      letters_of(axes_, scene_.scan.geometry));
   painter.setPen(kLetter);
   const QRectF inside = all.adjusted(kPlaneMargin_px, kPlaneMargin_px, -kPlaneMargin_px, -kPlaneMargin_px);
   painter.drawText(inside, Qt::AlignLeft | Qt::AlignTop,
-                   tr("%1, %2 of %3").arg(title_of(plane_)).arg(through + 1).arg(axes_.slices));
+                   tr("%1, %2 of %3").arg(title_of(plane_)).arg(slice() + 1).arg(axes_.slices));
   if (hasFocus()) {
     painter.setPen(kLetter);
     painter.drawRect(all.adjusted(0, 0, -1, -1));
   }
 }
 
+void ImagingPlane::paint_marks(QPainter& painter, const PlaneFrame& at) const {
+  const auto [column, row, through] = place_in(axes_, scene_.crosshair);
+  const auto [x, y] = pixel_of(axes_, at, column, row);
+  painter.setPen(kCrosshair);
+  painter.drawLine(QPointF(at.left_px, y), QPointF(at.left_px + at.width_px, y));
+  painter.drawLine(QPointF(x, at.top_px), QPointF(x, at.top_px + at.height_px));
+  const double voxel_px = at.width_px / axes_.columns;
+  if (scene_.look.box) {
+    const VoxelRange range = range_of(scene_.scan.geometry, scene_.look.box);
+    const auto first = place_in(axes_, range.first), last = place_in(axes_, range.last);
+    const auto a = pixel_of(axes_, at, std::min(first[0], last[0]), std::min(first[1], last[1]));
+    const auto b = pixel_of(axes_, at, std::max(first[0], last[0]), std::max(first[1], last[1]));
+    const double half_px = 0.5 * voxel_px, half_row_px = 0.5 * at.height_px / axes_.rows;
+    painter.setPen(kBoxEdge);
+    painter.drawRect(QRectF(QPointF(a[0] - half_px, a[1] - half_row_px), QPointF(b[0] + half_px, b[1] + half_row_px)));
+  }
+  for (const ImagingScene::SeedMark& seed : scene_.seeds) {
+    const auto place = place_in(axes_, seed.voxel);
+    if (place[2] != through) continue;
+    const auto middle = pixel_of(axes_, at, place[0], place[1]);
+    painter.setPen(seed.outside ? kOutside : kLetter);
+    painter.drawEllipse(QPointF(middle[0], middle[1]), kSeedMark_px, kSeedMark_px);
+  }
+  if (!hovered_ || !has_brush()) return;
+  const double radius_px = scene_.brush_mm / axes_.right_mm * voxel_px;
+  painter.setPen(kBrush);
+  painter.drawEllipse(QPointF(*hovered_), radius_px, radius_px);
+}
+
+void ImagingPlane::begin_drag(const std::array<int, 3>& voxel) {
+  dragging_ = true;
+  events_.begin_drag(axes_, voxel);
+}
+
+void ImagingPlane::end_drag(bool keep) {
+  if (!std::exchange(dragging_, false)) return;
+  events_.end_drag(keep);
+}
+
+void ImagingPlane::stop_drag() { end_drag(false); }
+
 void ImagingPlane::mousePressEvent(QMouseEvent* event) {
   dragged_from_ = event->pos();
-  if (scene_.open() && event->button() == Qt::LeftButton) events_.look_at(voxel_under(event->pos()));
+  if (!scene_.open() || event->button() != Qt::LeftButton) return;
+  if (scene_.tool != ImagingTool::look) return begin_drag(voxel_under(event->pos()));
+  events_.look_at(voxel_under(event->pos()));
+}
+
+void ImagingPlane::mouseReleaseEvent(QMouseEvent* event) {
+  if (event->button() == Qt::LeftButton) end_drag(true);
+}
+
+void ImagingPlane::leaveEvent(QEvent* /*event*/) {
+  hovered_.reset();
+  update();
 }
 
 void ImagingPlane::mouseMoveEvent(QMouseEvent* event) {
   if (!scene_.open()) return;
-  if ((event->buttons() & Qt::LeftButton) != 0) return events_.look_at(voxel_under(event->pos()));
+  hovered_ = event->pos();
+  if (has_brush()) update();
+  if ((event->buttons() & Qt::LeftButton) != 0) {
+    if (scene_.tool == ImagingTool::look) return events_.look_at(voxel_under(event->pos()));
+    if (dragging_) events_.drag(voxel_under(event->pos()));
+    return;
+  }
   if ((event->buttons() & Qt::RightButton) != 0) {
     const QPoint way = event->pos() - dragged_from_;
     dragged_from_ = event->pos();
@@ -135,15 +192,19 @@ void ImagingPlane::mouseMoveEvent(QMouseEvent* event) {
 }
 
 void ImagingPlane::mouseDoubleClickEvent(QMouseEvent* event) {
-  if (scene_.open() && event->button() == Qt::LeftButton) events_.keep(voxel_under(event->pos()));
+  if (!scene_.open() || event->button() != Qt::LeftButton) return;
+  if (scene_.tool != ImagingTool::look) return begin_drag(voxel_under(event->pos()));
+  events_.keep(voxel_under(event->pos()));
 }
 
 void ImagingPlane::wheelEvent(QWheelEvent* event) {
   turned_ += event->angleDelta().y();  // of a touchpad: a little at a time
   const int notches = turned_ / kWheelStep;
   turned_ %= kWheelStep;
-  if (scene_.open() && notches != 0) move_by(0, 0, notches);
   event->accept();
+  if (!scene_.open() || notches == 0) return;
+  if ((event->modifiers() & Qt::ControlModifier) != 0) return events_.change_brush(notches);
+  move_by(0, 0, notches);
 }
 
 void ImagingPlane::keyPressEvent(QKeyEvent* event) {
@@ -164,6 +225,11 @@ void ImagingPlane::keyPressEvent(QKeyEvent* event) {
     case Qt::Key_Return:
     case Qt::Key_Enter:
       return events_.keep(scene_.crosshair);
+    case Qt::Key_Space:
+      if (scene_.tool == ImagingTool::look) return QWidget::keyPressEvent(event);
+      return dragging_ ? end_drag(true) : begin_drag(scene_.crosshair);
+    case Qt::Key_Escape:
+      return dragging_ ? end_drag(false) : QWidget::keyPressEvent(event);
     default:
       return QWidget::keyPressEvent(event);
   }
@@ -174,6 +240,7 @@ void ImagingPlane::move_by(int right, int down, int through) {
   events_.look_at(voxel_at(axes_, std::clamp(column + right, 0, axes_.columns - 1),
                            std::clamp(row + down, 0, axes_.rows - 1),
                            std::clamp(slice + through, 0, axes_.slices - 1)));
+  if (dragging_) events_.drag(scene_.crosshair);
 }
 
 void ImagingPlane::go_to_slice(int slice) { move_by(0, 0, slice - this->slice()); }

@@ -4,10 +4,13 @@
 #include <QWidget>
 #include <array>
 #include <functional>
+#include <optional>
 #include <vector>
 
+#include "viewer_client/imaging/plane_drag.hpp"
 #include "viewer_client/imaging/plane_picture.hpp"
 
+class QPainter;
 class QSlider;
 
 namespace osteon {
@@ -19,12 +22,21 @@ struct ImagingScene {
   PlaneLook look;
   GreyTable greys{HuWindow{}};
   std::array<int, 3> crosshair{};  // its voxel
+  ImagingTool tool = ImagingTool::look;
+  double brush_mm = 3.0;  // radius
+  struct SeedMark {
+    std::array<int, 3> voxel{};
+    bool outside = false;
+  };
+  std::vector<SeedMark> seeds;
 
   [[nodiscard]] bool open() const { return !scan.values.empty(); }
 };
 
 // [GUI thread] The left button moves the crosshair, a double click keeps the bone there, the right button drags the
-// window, and the wheel goes through the slices. Arrow keys, page keys and Enter do the same.
+// window, and the wheel goes through the slices. Arrow keys, page keys and Enter do the same. With another tool the
+// left button drags the tool. On the keyboard, a blank begins and ends that drag at the crosshair, and Escape takes it
+// back.
 class ImagingPlane : public QWidget {
   Q_DECLARE_TR_FUNCTIONS(ImagingPlane)
 
@@ -32,6 +44,10 @@ class ImagingPlane : public QWidget {
   struct Events {
     std::function<void(const std::array<int, 3>&voxel)> look_at, point_at, keep;
     std::function<void(const HuWindow& window)> change_window;
+    std::function<void(const PlaneAxes& axes, const std::array<int, 3>& voxel)> begin_drag;
+    std::function<void(const std::array<int, 3>& voxel)> drag;
+    std::function<void(bool keep)> end_drag;
+    std::function<void(int notches)> change_brush;
   };
   // `scene` outlives the plane.
   ImagingPlane(Plane plane, const ImagingScene& scene, Events events, QWidget* parent = nullptr);
@@ -40,6 +56,8 @@ class ImagingPlane : public QWidget {
   void begin();
   // The scene has changed.
   void refresh();
+  // Takes a drag back.
+  void stop_drag();
   // Middle of a voxel, in pixels of the widget.
   [[nodiscard]] QPoint pixel(const std::array<int, 3>& voxel) const;
   [[nodiscard]] int slice() const;
@@ -50,7 +68,9 @@ class ImagingPlane : public QWidget {
   void paintEvent(QPaintEvent* event) override;
   void mousePressEvent(QMouseEvent* event) override;
   void mouseMoveEvent(QMouseEvent* event) override;
+  void mouseReleaseEvent(QMouseEvent* event) override;
   void mouseDoubleClickEvent(QMouseEvent* event) override;
+  void leaveEvent(QEvent* event) override;
   void wheelEvent(QWheelEvent* event) override;
   void keyPressEvent(QKeyEvent* event) override;
 
@@ -60,6 +80,13 @@ class ImagingPlane : public QWidget {
   // The crosshair, moved by so many voxels within the plane and through it.
   void move_by(int right, int down, int through);
   void go_to_slice(int slice);
+  void begin_drag(const std::array<int, 3>& voxel);
+  void end_drag(bool keep);
+  [[nodiscard]] bool has_brush() const {
+    return scene_.tool == ImagingTool::paint || scene_.tool == ImagingTool::erase;
+  }
+  // Crosshair, box, seeds and brush.
+  void paint_marks(QPainter& painter, const PlaneFrame& at) const;
 
   Plane plane_;
   const ImagingScene& scene_;
@@ -70,6 +97,8 @@ class ImagingPlane : public QWidget {
   int drawn_slice_ = -1;  // -1: the picture is stale
   int turned_ = 0;        // of the wheel, less than a notch
   QPoint dragged_from_;
+  bool dragging_ = false;  // a tool
+  std::optional<QPoint> hovered_;
 };
 
 }  // namespace osteon

@@ -17,7 +17,9 @@ namespace osteon {
 namespace {
 
 constexpr const char* kVoxelFile = "scan.nrrd";
+constexpr const char* kFilteredFiles[] = {"filtered-1.nrrd", "filtered-2.nrrd"};
 constexpr const char* kIslandFile = "islands.nrrd";
+constexpr const char* kBoxFile = "box.edits.yaml";
 constexpr const char* kPictures = "pictures";
 // Files with one scan by the ends of their names. What is inside decides in osteon-import.
 constexpr const char* kOneScan[] = {".nii", ".nii.gz", ".nrrd", ".nhdr", ".mha", ".mhd", ".inv3"};
@@ -30,6 +32,12 @@ bool has_one_scan(const QString& source) {
 }
 
 std::filesystem::path edits_of(const std::filesystem::path& bone) { return bone.string() + ".edits.yaml"; }
+
+QStringList options_of(const ScanFilter& filter) {
+  QStringList options;
+  for (const std::string& option : filter_options(filter)) options << QString::fromStdString(option);
+  return options;
+}
 
 QString number_text(double value) { return QLocale().toString(value, 'g', 3); }
 
@@ -74,7 +82,8 @@ std::vector<ListedIsland> listed_islands(const QString& said) {
 // StaleFiles knows a folder of this name as that of a program that was killed.
 ImagingSteps::ImagingSteps(Events events)
     : events_(std::move(events)),
-      scratch_(cases_folder() / (".partial-imaging-" + std::to_string(QCoreApplication::applicationPid()))) {}
+      scratch_(cases_folder() / (".partial-imaging-" + std::to_string(QCoreApplication::applicationPid()))),
+      shown_file_(kVoxelFile) {}
 
 ImagingSteps::~ImagingSteps() {
   if (loader_) loader_->wait();
@@ -106,7 +115,9 @@ void ImagingSteps::cancel() {
 void ImagingSteps::fail(const QString& sentence) {
   // The user knows the source, and not its copy.
   QString shown = sentence;
-  events_.failed(cancelled_ ? QString() : shown.replace(scratch_file(kScanFile), source_));
+  for (const char* copy : {kVoxelFile, kFilteredFiles[0], kFilteredFiles[1]})
+    shown.replace(scratch_file(copy), source_);
+  events_.failed(cancelled_ ? QString() : shown);
 }
 
 void ImagingSteps::start(const QStringList& arguments, std::function<void(const QString& said)> done) {
@@ -156,28 +167,59 @@ void ImagingSteps::read_series(const QString& said) {
 
 void ImagingSteps::read(std::optional<int> series) {
   series_ = series;
+  shown_file_ = kVoxelFile;
   QFile::remove(scratch_file(kVoxelFile));
   QStringList arguments{"export-scan", source_, scratch_file(kVoxelFile)};
   if (series) arguments << "--series" << QString::number(*series);
-  start(arguments, [this](const QString&) {
-    in_background(
-        [this] {
-          scan_ = read_scan_file(scratch_ / kVoxelFile);
-          if (scan_) histogram_ = histogram_of(*scan_);
-        },
-        [this] {
-          Result<ShownScan> scan = std::exchange(scan_, ShownScan());
-          if (!scan) return fail(QString::fromStdString(scan.error().message));
-          events_.read(std::move(*scan), histogram_);
-        });
-  });
+  start(arguments, [this](const QString&) { load(kVoxelFile, events_.read); });
 }
 
-void ImagingSteps::find(const ScanGeometry& scan, double threshold_hu) {
+void ImagingSteps::load(const char* file,
+                        const std::function<void(ShownScan scan, const HuHistogram& histogram)>& then) {
+  in_background(
+      [this, file] {
+        scan_ = read_scan_file(scratch_ / file);
+        if (scan_) histogram_ = histogram_of(*scan_);
+      },
+      [this, file, then] {
+        Result<ShownScan> scan = std::exchange(scan_, ShownScan());
+        if (!scan) return fail(QString::fromStdString(scan.error().message));
+        if (shown_file_ != file && shown_file_ != kVoxelFile) QFile::remove(scratch_file(shown_file_));
+        shown_file_ = file;
+        then(std::move(*scan), histogram_);
+      });
+}
+
+void ImagingSteps::filter(const ScanFilter& filter) {
+  cancelled_ = false;
+  if (filter == ScanFilter{}) return load(kVoxelFile, events_.filtered);
+  // The file that is shown stays until the new one is there: the filter may be cancelled.
+  const char* file = kFilteredFiles[shown_file_ == kFilteredFiles[0] ? 1 : 0];
+  QFile::remove(scratch_file(file));
+  start(QStringList{"export-scan", scratch_file(kVoxelFile), scratch_file(file)} + options_of(filter),
+        [this, file](const QString&) { load(file, events_.filtered); });
+}
+
+bool ImagingSteps::write_edits(const QString& file, const ImagingEdits& edits) {
+  const QByteArray text = QByteArray::fromStdString(edit_list_text(edits));
+  QSaveFile saved(file);
+  if (saved.open(QIODevice::WriteOnly) && saved.write(text) == text.size() && saved.commit()) return true;
+  fail(tr("Cannot write %1. Is the disk full?").arg(file));
+  return false;
+}
+
+void ImagingSteps::find(const ScanGeometry& scan, const ImagingEdits& edits) {
+  cancelled_ = false;
   QFile::remove(scratch_file(kIslandFile));
-  start({"islands", scratch_file(kVoxelFile), scratch_file(kIslandFile), "--threshold",
-         QString::number(threshold_hu, 'g', 17)},
-        [this, scan](const QString& said) { read_islands(said, scan); });
+  QStringList arguments{"islands", scratch_file(shown_file_), scratch_file(kIslandFile), "--threshold",
+                        QString::number(edits.threshold_hu, 'g', 17)};
+  if (edits.box) {
+    ImagingEdits box;
+    box.box = edits.box;
+    if (!write_edits(scratch_file(kBoxFile), box)) return;
+    arguments << "--edits" << scratch_file(kBoxFile);
+  }
+  start(arguments, [this, scan](const QString& said) { read_islands(said, scan); });
 }
 
 void ImagingSteps::read_islands(const QString& said, const ScanGeometry& scan) {
@@ -198,11 +240,9 @@ void ImagingSteps::make(const ImagingEdits& edits) {
   cancelled_ = false;
   out_ = new_case_folder(source_);
   const QString file = text_of(edits_of(out_));
-  const QByteArray text = QByteArray::fromStdString(edit_list_text(edits));
-  QSaveFile saved(file);
-  if (!saved.open(QIODevice::WriteOnly) || saved.write(text) != text.size() || !saved.commit())
-    return fail(tr("Cannot write %1. Is the disk full?").arg(file));
+  if (!write_edits(file, edits)) return;
   QStringList how{"ct", source_, "--threshold", QString::number(edits.threshold_hu, 'g', 17), "--edits", file};
+  how << options_of(edits.filter);
   if (series_) how << "--series" << QString::number(*series_);
   maker_ = std::make_unique<CaseMaker>(how, out_,
                                        CaseMaker::Events{[this](int percent) { events_.progress(percent); },

@@ -14,8 +14,8 @@
 
 #include "viewer_client/desktop/importer_run.hpp"
 #include "viewer_client/desktop/library.hpp"
-#include "viewer_client/imaging/edit_history.hpp"
 #include "viewer_client/imaging/hu_histogram.hpp"
+#include "viewer_client/imaging/imaging_edits.hpp"
 #include "viewer_client/imaging/island_map.hpp"
 
 namespace osteon {
@@ -37,7 +37,7 @@ class ImagingSteps : public QObject {
   struct Events {
     std::function<void(int percent)> progress;
     std::function<void(const std::vector<ListedSeries>& series)> listed;
-    std::function<void(ShownScan scan, const HuHistogram& histogram)> read;
+    std::function<void(ShownScan scan, const HuHistogram&histogram)> read, filtered;
     std::function<void(std::vector<ListedIsland> list, IslandMap map)> found;
     std::function<void(const std::filesystem::path& bone)> made;
     std::function<void(const QString& sentence)> failed;  // empty: cancelled
@@ -53,8 +53,10 @@ class ImagingSteps : public QObject {
   void open(const QString& source);
   // A series that was listed.
   void read(std::optional<int> series);
-  // Of the scan that was read.
-  void find(const ScanGeometry& scan, double threshold_hu);
+  // The scan that was read, as it is after a filter: tells `filtered`.
+  void filter(const ScanFilter& filter);
+  // The islands of the filtered scan, by the edits' threshold and box.
+  void find(const ScanGeometry& scan, const ImagingEdits& edits);
   // The case has the edit list beside it, in a file NAME.edits.yaml.
   void make(const ImagingEdits& edits);
 
@@ -64,6 +66,8 @@ class ImagingSteps : public QObject {
   void fail(const QString& sentence);
   [[nodiscard]] bool make_scratch();
   [[nodiscard]] QString scratch_file(const char* name) const;
+  void load(const char* file, const std::function<void(ShownScan scan, const HuHistogram& histogram)>& then);
+  [[nodiscard]] bool write_edits(const QString& file, const ImagingEdits& edits);
   void read_series(const QString& said);
   void read_islands(const QString& said, const ScanGeometry& scan);
 
@@ -71,6 +75,7 @@ class ImagingSteps : public QObject {
   std::filesystem::path scratch_;
   QString source_;
   std::optional<int> series_;
+  const char* shown_file_;     // in the scratch folder: the scan, or a filtered one
   std::filesystem::path out_;  // the case that is made
   bool cancelled_ = false;
   std::unique_ptr<ImporterRun> run_;

@@ -36,15 +36,21 @@ std::vector<std::uint32_t> draw_plane(const ShownScan& scan, const IslandMap& is
                                       const PlaneLook& look, const GreyTable& greys) {
   std::vector<std::uint32_t> pixels;
   pixels.reserve(static_cast<std::size_t>(axes.columns) * static_cast<std::size_t>(axes.rows));
+  const VoxelRange range = range_of(scan.geometry, look.box);
+  const std::vector<std::uint8_t> corrected =
+      corrected_plane(scan.geometry, islands, look.kept, axes, slice, look.corrections);
   for (int row = 0; row < axes.rows; ++row)
     for (int column = 0; column < axes.columns; ++column) {
       const std::array<int, 3> voxel = voxel_at(axes, column, row, slice);
       const std::int16_t hu = scan.at(voxel);
       const std::uint8_t island = islands.number(voxel);
-      const bool above = look.threshold_hu && hu >= *look.threshold_hu;
-      pixels.push_back(tinted(greys[hu], island != 0 && !look.threshold_hu ? look.islands[island]
-                                         : above                           ? kThresholdTint
-                                                                           : Tint{}));
+      const std::uint8_t mark = corrected.empty() ? std::uint8_t{0} : corrected[pixels.size()];
+      const bool above = look.threshold_hu && hu >= *look.threshold_hu && range.contains(voxel);
+      pixels.push_back(tinted(greys[hu], mark == kErased                     ? kErasedTint
+                                         : mark != 0                         ? look.bones[mark]
+                                         : island != 0 && !look.threshold_hu ? look.islands[island]
+                                         : above                             ? kThresholdTint
+                                                                             : Tint{}));
     }
   return pixels;
 }

@@ -5,6 +5,7 @@
 #include <optional>
 #include <vector>
 
+#include "viewer_client/imaging/corrected_plane.hpp"
 #include "viewer_client/imaging/hu_window.hpp"
 #include "viewer_client/imaging/island_map.hpp"
 #include "viewer_client/imaging/plane_view.hpp"
@@ -17,16 +18,20 @@ struct Tint {
 };
 // A colour for an island. Neighbours in the list differ. One that is left out is pale.
 [[nodiscard]] Tint tint_of(int island, bool kept);
-inline constexpr Tint kThresholdTint{255, 200, 40, 110};
+inline constexpr Tint kThresholdTint{255, 200, 40, 110}, kErasedTint{235, 40, 40, 120};
 
 struct PlaneLook {
   HuWindow window;
   std::optional<double> threshold_hu;  // voxels at or above it are tinted
   std::array<Tint, 256> islands{};     // by number; that of 0 is not used
+  std::array<Tint, 256> bones{};       // the same of what is painted
+  BonesOfIslands kept{};
+  std::vector<SharedCorrection> corrections;
+  std::optional<MarkedBox> box;  // the threshold tints nothing beside it
 };
 
 // One pixel for each voxel, 0xffRRGGBB, rows from the top. With a threshold the islands, which are of another one, are
-// not tinted.
+// not tinted. Corrections are tinted over all else.
 [[nodiscard]] std::vector<std::uint32_t> draw_plane(const ShownScan& scan, const IslandMap& islands,
                                                     const PlaneAxes& axes, int slice, const PlaneLook& look,
                                                     const GreyTable& greys);

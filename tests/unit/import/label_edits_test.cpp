@@ -107,6 +107,58 @@ TEST(LabelEdits, APolylineIsARodWithRoundEnds) {
   EXPECT_NEAR(mm3_of(grid, labels, 9), angle_mm3, 0.02 * angle_mm3);
 }
 
+// The same rod, taken out of solid bone.
+TEST(LabelEdits, AnEraserGoesAlongAPolyline) {
+  const imaging::HuVolume grid = turned_grid();
+  const Vec3 middle = middle_of(grid), x = Vec3::UnitX();
+  imaging::VoxelMask labels = all_of(grid, 2);
+  apply(grid,
+        edits_of("  - {kind: erase, radius_mm: 3, points_mm: [" + xyz(middle - 8.0 * x) + ", " + xyz(middle + 8.0 * x) +
+                 "]}\n"),
+        labels);
+  const double rod_mm3 = std::numbers::pi * 9.0 * 16.0 + 4.0 / 3.0 * std::numbers::pi * 27.0;
+  EXPECT_NEAR(mm3_of(grid, labels, 0), rod_mm3, 0.02 * rod_mm3);
+}
+
+// A disc: the area of its circle, one slice thick. Each axis of the grid has slices of another thickness.
+TEST(LabelEdits, WithANormalABallIsADiscInOneSlice) {
+  const imaging::HuVolume grid = turned_grid();
+  const Vec3 centre = grid.position_mm(Vec3(31, 29, 20));
+  for (int axis = 0; axis < 3; ++axis) {
+    imaging::VoxelMask labels(grid.dims);
+    LabelEdit disc{.kind = EditKind::paint, .bone = 4, .points_mm = {centre}, .radius_mm = 7.0};
+    disc.normal = grid.directions.col(axis);
+    apply(grid, {disc}, labels);
+    const double disc_mm3 = std::numbers::pi * 49.0 * grid.spacing_mm[axis];
+    EXPECT_NEAR(mm3_of(grid, labels, 4), disc_mm3, 0.03 * disc_mm3) << axis;
+    for (int k = 0; k < grid.dims[2]; ++k)
+      for (int j = 0; j < grid.dims[1]; ++j)
+        for (int i = 0; i < grid.dims[0]; ++i)
+          if (labels.at(i, j, k) != 0) {
+            EXPECT_EQ(Eigen::Vector3i(i, j, k)[axis], Eigen::Vector3i(31, 29, 20)[axis]);
+          }
+  }
+}
+
+TEST(LabelEdits, ABoxHasTheVoxelsBetweenItsCorners) {
+  const imaging::HuVolume grid = turned_grid();
+  const auto box = [&](const Vec3& a, const Vec3& b) {
+    return boxed_voxels(
+        grid, std::vector{LabelEdit{.kind = EditKind::box, .points_mm = {grid.position_mm(a), grid.position_mm(b)}}});
+  };
+  const auto boxed = box({30, 5, 39}, {10, 20.4, 12.6});
+  ASSERT_TRUE(boxed && *boxed);
+  EXPECT_EQ((*boxed)->first, (std::array{10, 5, 13}));
+  EXPECT_EQ((*boxed)->last, (std::array{30, 20, 39}));
+  const auto beyond = box({-99, -99, -99}, {99, 99, 99});
+  ASSERT_TRUE(beyond && *beyond);
+  EXPECT_EQ((*beyond)->count(), grid.count());
+  EXPECT_FALSE(*boxed_voxels(grid, {}));
+  const auto none = box({70, 5, 5}, {80, 9, 9});
+  ASSERT_FALSE(none);
+  expect_one_sentence(none.error(), "edit 1 (box): it holds no voxel of the scan");
+}
+
 TEST(LabelEdits, APlaneCutsOffOneSideOfOneBone) {
   const imaging::HuVolume grid = turned_grid();
   const double ball_mm3 = 4.0 / 3.0 * std::numbers::pi * 343.0;
@@ -216,18 +268,44 @@ TEST(EditFile, FaultsAreOneSentenceWithFileEditFieldAndRemedy) {
            {"{kind: cut, bone: 1, point_mm: [0, 0, 0], normal: [0, 0, 1], to_bone: 1}", "to_bone is 1, as bone is; "},
            {"{kind: scribble, bone: 1, points_mm: [[0, 0, 0]], radius_mm: 1}", "points_mm is not a list of 2 to 1000"},
            {"{kind: smear, bone: 1}", "kind is \"smear\"; "},
+           {"{kind: erase, radius_mm: 1}", "erase needs centre_mm or points_mm"},
+           {"{kind: erase, radius_mm: 1, centre_mm: [0, 0, 0], points_mm: [[0, 0, 0], [1, 0, 0]]}",
+            "erase needs centre_mm or points_mm"},
+           {"{kind: paint, bone: 1, centre_mm: [0, 0, 0], radius_mm: 1, normal: [0, 0, 0]}", "normal has no length; "},
+           {"{kind: outside}", "point_mm is missing; "},
+           {"{kind: outside, point_mm: [0, 0, 0], bone: 1}", "\"bone\" is no field of outside; "},
+           {"{kind: box, corner_mm: [0, 0, 0]}", "opposite_mm is missing; "},
+           {"{kind: label, bone: 1}", "name is missing; "},
+           {"{kind: label, bone: 1, name: ''}", "name is not one to 60 bytes"},
+           {"{kind: label, bone: 1, name: \"a\\tb\"}", "name is not one to 60 bytes"},
+           {"{kind: label, bone: 1, name: bone 2}", "name is \"bone 2\", which only a bone of that number may have; "},
+           {"{kind: label, bone: 1, name: femur, opacity: 1.5}", "opacity is \"1.5\"; "},
+           {"{kind: label, bone: 1, name: femur, minutes: -1}", "minutes is \"-1\"; "},
            {"{bone: 1}", "kind is missing; "},
            {"paint", "kind is missing; "},
        }) {
     const auto refused = parse_edits("edits:\n" + fine + "  - " + list + "\n", "my-edits.yaml");
     ASSERT_FALSE(refused) << list;
-    expect_one_sentence(refused.error(), "my-edits.yaml, edit 2: " + what);
+    expect_one_sentence(refused.error(), "my-edits.yaml, line 3, edit 2: " + what);
   }
   for (const char* text : {"", "edits:", "edits: 3", "edits: []", "[1, 2]", "edit: [{kind: seed, point_mm: [0, 0, 0]}]",
                            "edits: [{kind: seed, point_mm: [0, 0, 0]}]\nmore: 1", "edits: [", "a: &a [*a]"}) {
     const auto refused = parse_edits(text, "my-edits.yaml");
     ASSERT_FALSE(refused) << text;
     expect_one_sentence(refused.error(), "my-edits.yaml");
+  }
+}
+
+TEST(EditFile, WhatMayBeThereOnceIsRefusedTheSecondTime) {
+  const std::string box = "  - {kind: box, corner_mm: [0, 0, 0], opposite_mm: [1, 1, 1]}\n";
+  const std::string femur = "  - {kind: label, bone: 1, name: femur}\n";
+  for (const auto& [list, what] :
+       {std::pair<std::string, std::string>{box + box, "there is a box before it; "},
+        {femur + "  - {kind: label, bone: 1, name: tibia}\n", "bone 1 has a label before it; "},
+        {femur + "  - {kind: label, bone: 2, name: femur}\n", "name is \"femur\", as that of another label; "}}) {
+    const auto refused = parse_edits("edits:\n" + list, "my-edits.yaml");
+    ASSERT_FALSE(refused) << list;
+    expect_one_sentence(refused.error(), "my-edits.yaml, line 3, edit 2: " + what);
   }
 }
 
@@ -247,6 +325,28 @@ TEST(EditFile, ListsOfAnyLengthAreBounded) {
   ASSERT_FALSE(missing);
   EXPECT_EQ(missing.error().code, ErrorCode::not_found);
   EXPECT_FALSE(read_edits(dir.path()));
+}
+
+TEST(EditFile, ReadsWhatIsNoCorrection) {
+  const auto edits = edits_of(
+      "  - {kind: outside, point_mm: [1, 2, 3]}\n"
+      "  - {kind: box, corner_mm: [1, 2, 3], opposite_mm: [4, 5, 6]}\n"
+      "  - {kind: label, bone: 3, name: left femur, opacity: 0.25, minutes: 7.5}\n"
+      "  - {kind: label, bone: 4, name: bone 4}\n"
+      "  - {kind: erase, bone: 2, points_mm: [[0, 0, 0], [1, 0, 0]], radius_mm: 2, normal: [0, 0, 2]}\n");
+  ASSERT_EQ(edits.size(), 5u);
+  EXPECT_EQ(edits[0].points_mm, (std::vector<Vec3>{{1, 2, 3}}));
+  EXPECT_EQ(edits[1].points_mm.size(), 2u);
+  EXPECT_EQ(edits[2].name, "left femur");
+  EXPECT_EQ(edits[2].opacity, 0.25);
+  EXPECT_EQ(edits[2].minutes, 7.5);
+  EXPECT_EQ(edits[3].opacity, 1.0);
+  EXPECT_EQ(edits[4].normal, Vec3::UnitZ());
+  EXPECT_EQ(edit_text(edits[2]), "label bone 3 left femur, opacity 0.25, 7.5 min");
+  EXPECT_EQ(edit_text(edits[1]), "box from 1,2,3 to 4,5,6 mm");
+  const LabelEdit longest{
+      .kind = EditKind::label, .bone = 254, .name = std::string(60, 'x'), .opacity = 1.0 / 3.0, .minutes = 1e5 / 3.0};
+  EXPECT_LT(edit_text(longest).size(), 200u);
 }
 
 TEST(EditFile, EachEditIsALineForTheProvenance) {

@@ -395,14 +395,19 @@ TEST_F(Program, WrongEditsAreOneSentence) {
     expect_refused(arguments, named, folder_);
   };
   const std::string seed = "edits: [{kind: seed, point_mm: [3, 3, 3]}]";
-  refused("edits: [{kind: erase, centre_mm: [3, 3, 3], radius_mm: NaN}]", {}, "edit 1: radius_mm is \"NaN\"");
+  refused("edits: [{kind: erase, centre_mm: [3, 3, 3], radius_mm: NaN}]", {}, "line 1, edit 1: radius_mm is \"NaN\"");
   refused(seed, {"--keep", "1"}, "has a seed, which --keep and --labels exclude");
   refused(seed, {"--list"}, "--list");
+  refused("edits: [{kind: outside, point_mm: [3, 3, 3]}]", {}, "has a seed outside and none of a bone");
+  refused("edits: [{kind: box, corner_mm: [0, 0, 0], opposite_mm: [9, 9, 9]}]", {"--labels", path("series")},
+          "has a box, which --labels excludes");
   refused(seed, {"--separate", "--merge"}, "--merge");
   expect_refused({"ct", path("series"), "--out", path("case"), "--edits", path("none.yaml")}, "none.yaml", folder_);
   // These are found out when the scan is there.
   for (const auto& [text, named] :
        {std::pair{"edits: [{kind: erase, centre_mm: [-99, 3, 3], radius_mm: 1}]", "edit 1 (erase): it covers no voxel"},
+        std::pair{"edits: [{kind: box, corner_mm: [-99, 3, 3], opposite_mm: [-90, 9, 9]}]",
+                  "edit 1 (box): it holds no voxel of the scan"},
         std::pair{"edits: [{kind: seed, point_mm: [-99, 3, 3]}]", "lies outside the scan"}}) {
     std::ofstream(path("edits.yaml")) << text;
     const auto late = test::run(kProgram, {"ct", path("series"), "--out", path("case"), "--edits", path("edits.yaml")});

@@ -199,6 +199,70 @@ TEST(EditedBones, EditsChangeTheLabelsOfALabelMap) {
   EXPECT_NEAR(import->labels.cm3[0], import->labels.cm3[1], 1e-9) << "mirrored balls";
 }
 
+// Two balls that touch are one island. A seed outside takes the other ball away.
+TEST(SeparatedBones, WhatGrowsFromASeedOutsideIsNoBone) {
+  CtOptions options;
+  options.separate = true;
+  options.surface = SurfaceAt::threshold;
+  options.grow.seeds_mm = {{9, 10, 10}, {25, 10, 10}};
+  options.grow.bones = {1, 254};
+  const auto both = made(options);
+  options.grow.outside = 254;
+  const auto one = made(options);
+  ASSERT_TRUE(both && one) << one.error().message;
+  EXPECT_NEAR(one->bone->volume_mm3(), 0.5 * both->bone->volume_mm3(), 0.02 * both->bone->volume_mm3());
+  ASSERT_EQ(one->bone->info().labels.size(), 1u);
+  EXPECT_EQ(one->bone->bone_number({9, 10, 10}), 1);
+  options.grow.bones = {254, 254};
+  const auto none = made(options);
+  ASSERT_FALSE(none);
+  EXPECT_NE(none.error().message.find("leaves no bone"), std::string::npos) << none.error().message;
+}
+
+TEST(EditedBones, ALabelHasTheNameAndTheMinutesThatAPersonGives) {
+  CtOptions options = with_edits(
+      "  - {kind: label, bone: 2, name: humerus, opacity: 0.5, minutes: 3.5}\n"
+      "  - {kind: erase, bone: 1, centre_mm: [9, 10, 10], radius_mm: 2}\n");
+  options.separate = true;
+  options.grow.seeds_mm = {{9, 10, 10}, {25, 10, 10}};
+  const auto import = made(options);
+  ASSERT_TRUE(import) << import.error().message;
+  EXPECT_EQ(label_of(*import, 1)->name, "bone 1");
+  EXPECT_EQ(label_of(*import, 2)->name, "humerus");
+  EXPECT_EQ(label_of(*import, 2)->provenance.parameters.at("minutes"), 3.5);
+  EXPECT_EQ(label_of(*import, 2)->provenance.edits,
+            std::vector<std::string>{"label bone 2 humerus, opacity 0.5, 3.5 min"});
+}
+
+// An eraser beside the bone is no mistake, wherever in the scan it is.
+TEST(EditedBones, AnEraserFarFromTheBoneChangesNothing) {
+  const auto plain = made(with_edits("  - {kind: erase, centre_mm: [9, 10, 10], radius_mm: 0.5}\n"));
+  const auto also =
+      made(with_edits("  - {kind: erase, centre_mm: [9, 10, 10], radius_mm: 0.5}\n"
+                      "  - {kind: erase, centre_mm: [1, 1, 1], radius_mm: 1}\n"));
+  ASSERT_TRUE(plain && also) << also.error().message;
+  EXPECT_EQ(plain->bone->volume_mm3(), also->bone->volume_mm3());
+}
+
+// A box around the third ball. Without it, the two others would be kept. Another box divides that ball.
+TEST(EditedBones, OnlyTheBoxCounts) {
+  CtOptions options = with_edits("  - {kind: box, corner_mm: [55, 21, 21], opposite_mm: [36, 0, 0]}\n");
+  const auto ball = made(options);
+  ASSERT_TRUE(ball) << ball.error().message;
+  const double ball_mm3 = 4.0 / 3.0 * std::numbers::pi * 216.0;
+  EXPECT_NEAR(ball->bone->volume_mm3(), ball_mm3, 0.03 * ball_mm3);
+  EXPECT_EQ(ball->found.islands.size(), 1u);
+  options.edits[0].points_mm[1].x() = 46.0;
+  const auto half = made(options);
+  ASSERT_TRUE(half) << half.error().message;
+  // The first whole voxel of the box begins at x = 45.5, 1 mm beyond the middle of the ball.
+  const double cap_mm = 6.0 + 1.0;
+  const double part_mm3 = std::numbers::pi * cap_mm * cap_mm * (6.0 - cap_mm / 3.0);
+  EXPECT_NEAR(half->bone->volume_mm3(), part_mm3, 0.04 * part_mm3);
+  EXPECT_NE(half->bone->info().source.find("a box of it"), std::string::npos) << half->bone->info().source;
+  EXPECT_EQ(label_of(*half, 1)->provenance.parameters.at("box_2_x_mm"), 46.0);
+}
+
 TEST(EditedBones, EditsThatCannotBeNameTheirFile) {
   const auto away = made(with_edits("  - {kind: erase, centre_mm: [900, 0, 0], radius_mm: 3}\n"));
   ASSERT_FALSE(away);

@@ -612,6 +612,49 @@
     </message>
 </context>
 <context>
+    <name>ImagingBoneChoice</name>
+    <message>
+        <source>Bone of the tools</source>
+        <translation>Knochen der Werkzeuge</translation>
+    </message>
+    <message>
+        <source>The bone of the next seed, brush or cut. Seeds of one bone merge their parts.</source>
+        <translation>Knochen der Werkzeuge. Saatpunkte eines Knochens vereinen ihre Teile.</translation>
+    </message>
+    <message>
+        <source>Bone</source>
+        <translation>Knochen</translation>
+    </message>
+    <message>
+        <source>Name of the bone</source>
+        <translation>Name des Knochens</translation>
+    </message>
+    <message>
+        <source>Name of the bone in the case, such as femur</source>
+        <translation>Name des Knochens im Fall, etwa Femur</translation>
+    </message>
+    <message>
+        <source>Opacity of its tint</source>
+        <translation>Deckkraft seiner Farbe</translation>
+    </message>
+    <message>
+        <source> %</source>
+        <translation> %</translation>
+    </message>
+    <message>
+        <source>new, or under the mouse</source>
+        <translation>neu, oder unter der Maus</translation>
+    </message>
+    <message>
+        <source>Choose a bone first.</source>
+        <translation>Wählen Sie zuerst einen Knochen.</translation>
+    </message>
+    <message>
+        <source>Its name</source>
+        <translation>Sein Name</translation>
+    </message>
+</context>
+<context>
     <name>ImagingHistogram</name>
     <message>
         <source>Histogram of the HU</source>
@@ -840,6 +883,74 @@
         <source>Open the folder of a CT, a CD, or a file: zip, ISO, NIfTI, NRRD or MetaImage.</source>
         <translation>Öffnen Sie einen Ordner, eine CD oder eine Datei: Zip, ISO, NIfTI, NRRD, MetaImage.</translation>
     </message>
+    <message>
+        <source>Filter of the scan</source>
+        <translation>Filter der Aufnahme</translation>
+    </message>
+    <message>
+        <source>A median takes out single wrong voxels, a Gaussian takes out noise</source>
+        <translation>Ein Median entfernt einzelne falsche Voxel, ein Gaußfilter Rauschen</translation>
+    </message>
+    <message>
+        <source>None</source>
+        <translation>Keine</translation>
+    </message>
+    <message>
+        <source>Median, slice</source>
+        <translation>Median, Schicht</translation>
+    </message>
+    <message>
+        <source>Median, volume</source>
+        <translation>Median, Volumen</translation>
+    </message>
+    <message>
+        <source>Gaussian</source>
+        <translation>Gauß</translation>
+    </message>
+    <message>
+        <source>Sigma of the Gaussian</source>
+        <translation>Sigma des Gaußfilters</translation>
+    </message>
+    <message>
+        <source>Sigma of the Gaussian. Half a voxel to one voxel is usual.</source>
+        <translation>Sigma des Gaußfilters. Üblich ist ein halbes bis ein ganzes Voxel.</translation>
+    </message>
+    <message>
+        <source> mm</source>
+        <translation> mm</translation>
+    </message>
+    <message>
+        <source>Filtering the scan</source>
+        <translation>Die Aufnahme wird gefiltert</translation>
+    </message>
+    <message>
+        <source>Choose the Gaussian first.</source>
+        <translation>Wählen Sie zuerst den Gaußfilter.</translation>
+    </message>
+    <message>
+        <source>The edit list is full, at 1000 edits or 1 MiB. Make the bone, or undo edits.</source>
+        <translation>Die Liste der Änderungen ist voll (1000 oder 1 MiB). Nehmen Sie einige zurück.</translation>
+    </message>
+    <message>
+        <source>What touches a bone there is separated from it and left out.</source>
+        <translation>Was dort einen Knochen berührt, wird getrennt und weggelassen.</translation>
+    </message>
+    <message>
+        <source>Drag a line through the bone. What is to its right is cut off.</source>
+        <translation>Ziehen Sie eine Linie durch den Knochen. Was rechts liegt, fällt weg.</translation>
+    </message>
+    <message>
+        <source>The line begins on no kept bone. Begin on one, or choose the bone.</source>
+        <translation>Die Linie beginnt auf keinem Knochen. Wählen Sie einen.</translation>
+    </message>
+    <message>
+        <source>No bone can be called that. Write a short name that no other bone has.</source>
+        <translation>So kann kein Knochen heißen. Der Name ist kurz und gehört keinem anderen.</translation>
+    </message>
+    <message>
+        <source>Smoothing</source>
+        <translation>Glättung</translation>
+    </message>
 </context>
 <context>
     <name>ImagingPlane</name>
@@ -864,8 +975,8 @@
         <translation>%1, %2 von %3</translation>
     </message>
     <message>
-        <source>Left: crosshair. Double click, Enter: keep. Right drag: window. Wheel: slices.</source>
-        <translation>Links: Fadenkreuz. Doppelklick, Eingabe: behalten. Rechts: Fenster. Rad: Schichten.</translation>
+        <source>Left: the tool. Double click, Enter: keep. Right drag: window. Wheel: slices.</source>
+        <translation>Links: Werkzeug. Doppelklick, Eingabe: behalten. Rechts: Fenster. Rad: Schichten.</translation>
     </message>
 </context>
 <context>
@@ -893,6 +1004,81 @@
     <message>
         <source>Cannot write %1. Is the disk full?</source>
         <translation>%1 kann nicht geschrieben werden. Ist die Platte voll?</translation>
+    </message>
+</context>
+<context>
+    <name>ImagingTools</name>
+    <message>
+        <source>Crosshair</source>
+        <translation>Fadenkreuz</translation>
+    </message>
+    <message>
+        <source>The left button moves the crosshair</source>
+        <translation>Die linke Taste bewegt das Fadenkreuz</translation>
+    </message>
+    <message>
+        <source>Paint</source>
+        <translation>Malen</translation>
+    </message>
+    <message>
+        <source>What the brush touches becomes bone</source>
+        <translation>Was der Pinsel berührt, wird Knochen</translation>
+    </message>
+    <message>
+        <source>Erase</source>
+        <translation>Radieren</translation>
+    </message>
+    <message>
+        <source>What the brush touches is no bone</source>
+        <translation>Was der Pinsel berührt, ist kein Knochen</translation>
+    </message>
+    <message>
+        <source>Cut</source>
+        <translation>Schneiden</translation>
+    </message>
+    <message>
+        <source>Drag a line. What is to its right is cut off the bone where the line begins.</source>
+        <translation>Ziehen Sie eine Linie. Was rechts von ihr liegt, wird abgeschnitten.</translation>
+    </message>
+    <message>
+        <source>Outside</source>
+        <translation>Außen</translation>
+    </message>
+    <message>
+        <source>Click on what is no bone and touches one. It is separated and left out.</source>
+        <translation>Klicken Sie auf etwas am Knochen, das keiner ist. Es wird weggelassen.</translation>
+    </message>
+    <message>
+        <source>Box</source>
+        <translation>Quader</translation>
+    </message>
+    <message>
+        <source>Drag a rectangle on two planes. Only the box counts. A click takes it away.</source>
+        <translation>Ziehen Sie Rechtecke auf zwei Ebenen. Nur der Quader zählt. Ein Klick entfernt ihn.</translation>
+    </message>
+    <message>
+        <source>Radius of the brush</source>
+        <translation>Radius des Pinsels</translation>
+    </message>
+    <message>
+        <source>Radius of the brush, also Ctrl and the wheel</source>
+        <translation>Radius des Pinsels, auch mit Strg und Rad</translation>
+    </message>
+    <message>
+        <source> mm</source>
+        <translation> mm</translation>
+    </message>
+    <message>
+        <source>One slice</source>
+        <translation>Eine Schicht</translation>
+    </message>
+    <message>
+        <source>The brush is a disc in the slice that you see, instead of a ball</source>
+        <translation>Der Pinsel ist eine Scheibe in der sichtbaren Schicht statt einer Kugel</translation>
+    </message>
+    <message>
+        <source>Choose the brush first: Paint or Erase.</source>
+        <translation>Wählen Sie zuerst den Pinsel: Malen oder Radieren.</translation>
     </message>
 </context>
 <context>

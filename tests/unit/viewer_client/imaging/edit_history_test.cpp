@@ -2,13 +2,13 @@
 
 #include <gtest/gtest.h>
 
-#include "server/import/edit_file.hpp"
+#include <memory>
 
 namespace osteon {
 namespace {
 
 ImagingEdits with_seed(ImagingEdits edits, const Vec3& seed) {
-  edits.seeds_mm.push_back(seed);
+  edits.seeds.push_back({seed, 1});
   return edits;
 }
 
@@ -45,24 +45,53 @@ TEST(EditHistory, ANewEditTakesThePlaceOfWhatWasUndone) {
   EXPECT_EQ(history.now(), none);
 }
 
+TEST(EditHistory, EveryKindOfEditIsAStep) {
+  EditHistory history;
+  std::vector<ImagingEdits> states{history.now()};
+  const auto step = [&](auto change) {
+    ImagingEdits edits = history.now();
+    change(edits);
+    history.apply(edits);
+    states.push_back(edits);
+  };
+  step([](ImagingEdits& edits) { edits.filter.median = MedianFilter::volume; });
+  step([](ImagingEdits& edits) { edits.filter.gaussian_mm = 0.5; });
+  step([](ImagingEdits& edits) { edits.box = MarkedBox{{0, 0, 0}, {5, 5, 5}}; });
+  step([](ImagingEdits& edits) { edits.seeds.push_back({{1, 1, 1}, 0}); });
+  step([](ImagingEdits& edits) {
+    edits.corrections.push_back(std::make_shared<const Correction>(Correction{.bone = 1, .points_mm = {{1, 2, 3}}}));
+  });
+  step([](ImagingEdits& edits) { own_label(edits, 1).name = "femur"; });
+  step([](ImagingEdits& edits) { own_label(edits, 1).opacity_percent = 50; });
+  for (std::size_t i = states.size(); i-- > 0;) {
+    EXPECT_EQ(history.now(), states[i]) << i;
+    history.undo();
+  }
+  for (std::size_t i = 1; i < states.size(); ++i) {
+    history.redo();
+    EXPECT_EQ(history.now(), states[i]) << i;
+  }
+}
+
+// A long stroke in a thousand states is there once.
+TEST(EditHistory, StatesShareTheirStrokes) {
+  EditHistory history;
+  const auto stroke = std::make_shared<const Correction>(Correction{.points_mm = std::vector<Vec3>(1000)});
+  ImagingEdits edits;
+  edits.corrections.push_back(stroke);
+  for (int i = 0; i < 1000; ++i) {
+    edits.threshold_hu += 1.0;
+    history.apply(edits);
+  }
+  EXPECT_EQ(history.now().corrections.front().get(), stroke.get());
+  history.undo();
+  EXPECT_EQ(history.now().corrections.front().get(), stroke.get());
+}
+
 TEST(EditHistory, AnEditThatChangesNothingIsNoStep) {
   EditHistory history;
   history.apply(history.now());
   EXPECT_FALSE(history.can_undo());
-}
-
-// The importer's own reader gets the same positions, bit for bit, in the same order.
-TEST(EditHistory, IsAnEditListOfTheImporter) {
-  ImagingEdits edits;
-  edits.seeds_mm = {{1.0 / 3.0, -20.1, 1e-3}, {-0.1, 1e4 / 7.0, 5.0}};
-  const auto read = import::parse_edits(edit_list_text(edits), "edits.yaml");
-  ASSERT_TRUE(read) << read.error().message;
-  ASSERT_EQ(read->size(), edits.seeds_mm.size());
-  for (std::size_t i = 0; i < read->size(); ++i) {
-    EXPECT_EQ((*read)[i].kind, import::EditKind::seed);
-    EXPECT_EQ((*read)[i].bone, 0);
-    EXPECT_EQ((*read)[i].points_mm, std::vector<Vec3>{edits.seeds_mm[i]});
-  }
 }
 
 }  // namespace

@@ -1,0 +1,52 @@
+// The page of image processing on the bench of a window, with a scan of two balls.
+#pragma once
+#include <QSettings>
+#include <array>
+#include <cmath>
+#include <filesystem>
+#include <string>
+
+#include "server/import/dicom_writer.hpp"
+#include "tests/integration/two_balls.hpp"
+#include "tests/integration/window_bench.hpp"
+#include "viewer_client/desktop/imaging_plane.hpp"
+#include "viewer_client/desktop/language.hpp"
+
+namespace osteon::test {
+
+class ImagingBench : public WindowBench {
+ protected:
+  void SetUp() override {
+    QSettings().setValue("tour/seen", true);
+    speak("en");
+    WindowBench::SetUp();
+  }
+  // A folder of DICOM files, written once for each name.
+  [[nodiscard]] static std::filesystem::path series(const std::string& name, const imaging::HuVolume& scan) {
+    std::filesystem::path folder = desk_->temp() / name;
+    if (!std::filesystem::exists(folder)) {
+      const auto written = import::write_dicom_series(scan, folder, [](double) { return true; });
+      EXPECT_TRUE(written) << written.error().message;
+    }
+    return folder;
+  }
+  template <class Widget>
+  [[nodiscard]] Widget& part(const char* name) const {
+    auto* found = window_->findChild<Widget*>(name);
+    if (found == nullptr) ADD_FAILURE() << name;
+    return *found;
+  }
+  [[nodiscard]] ImagingPlane& plane(const char* name) const {
+    auto* found = dynamic_cast<ImagingPlane*>(window_->findChild<QWidget*>(name));
+    if (found == nullptr) ADD_FAILURE() << name;
+    return *found;
+  }
+  [[nodiscard]] std::string words() const { return label("imaging_words").toStdString(); }
+  // The middle voxel of the ball on the patient's left (1) or right (-1).
+  [[nodiscard]] static std::array<int, 3> ball(int side) {
+    const Vec3 voxel = two_balls().voxel(Vec3(side * kApart_mm, 0, 0));
+    return {static_cast<int>(std::lround(voxel.x())), static_cast<int>(std::lround(voxel.y())), 12};
+  }
+};
+
+}  // namespace osteon::test

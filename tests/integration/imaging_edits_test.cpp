@@ -1,0 +1,274 @@
+// The tools of image processing in the window, with the mouse and the keyboard: each edit shows at once, can be undone,
+// and makes the case that osteon-import makes of the same edit list.
+#include <gtest/gtest.h>
+
+#include <QCheckBox>
+#include <QComboBox>
+#include <QDoubleSpinBox>
+#include <QLineEdit>
+#include <QListWidget>
+#include <QPushButton>
+#include <QSlider>
+#include <QSpinBox>
+#include <QTest>
+#include <QToolButton>
+#include <QWheelEvent>
+#include <algorithm>
+#include <filesystem>
+#include <sstream>
+#include <string>
+
+#include "common/volume/case.hpp"
+#include "tests/integration/imaging_bench.hpp"
+#include "tests/support/content.hpp"
+#include "tests/support/process.hpp"
+#include "viewer_client/desktop/library.hpp"
+
+namespace osteon {
+namespace {
+
+namespace fs = std::filesystem;
+using test::two_balls;
+
+class ImagingEditsTest : public test::ImagingBench {
+ protected:
+  void SetUp() override {
+    ImagingBench::SetUp();
+    window_->process_images(QString::fromStdString(folder().string()));
+    auto& list = part<QListWidget>("series");
+    ASSERT_TRUE(until([&] { return list.isVisible() && list.count() == 1; })) << words();
+    QTest::mouseClick(list.viewport(), Qt::LeftButton, {}, list.visualItemRect(list.item(0)).center());
+    ASSERT_TRUE(until([&] { return found(2); })) << words();
+    part<QSlider>("slice_axial").setValue(12);
+  }
+  [[nodiscard]] static fs::path folder() { return series("brushed", two_balls()); }
+  [[nodiscard]] bool found(int count) const {
+    return !part<QPushButton>("imaging_cancel").isVisible() && part<QListWidget>("islands").isVisible() &&
+           part<QListWidget>("islands").isEnabled() && part<QListWidget>("islands").count() == count;
+  }
+  void click(const char* button) {
+    ASSERT_TRUE(part<QAbstractButton>(button).isEnabled()) << button;
+    QTest::mouseClick(&part<QAbstractButton>(button), Qt::LeftButton);
+  }
+  [[nodiscard]] bool can_undo() const { return part<QPushButton>("undo_edit").isEnabled(); }
+  static void drag(ImagingPlane& over, const std::array<int, 3>& from, const std::array<int, 3>& to) {
+    const QPoint begin = over.pixel(from), end = over.pixel(to);
+    QTest::mousePress(&over, Qt::LeftButton, {}, begin);
+    for (int step = 1; step <= 4; ++step) {
+      QMouseEvent move(QEvent::MouseMove, begin + (end - begin) * step / 4, Qt::NoButton, Qt::LeftButton, {});
+      QApplication::sendEvent(&over, &move);
+    }
+    QTest::mouseRelease(&over, Qt::LeftButton, {}, end);
+  }
+  // Of a voxel, away from the crosshair.
+  [[nodiscard]] static QColor colour(ImagingPlane& of, const std::array<int, 3>& voxel) {
+    return {of.grab().toImage().pixel(of.pixel(voxel))};
+  }
+  // Makes the bone in the window, and again with the command that its edit list names. Returns it.
+  [[nodiscard]] Result<Case> made_twice() {
+    const auto before = test::names_in(cases_folder());
+    click("make_bone");
+    if (!until([&] { return view_->surface_shown(); })) return failure(ErrorCode::internal, words() + problem());
+    std::string name;
+    for (const std::string& there : test::names_in(cases_folder()))
+      if (std::ranges::find(before, there) == before.end() && there.ends_with(".edits.yaml")) name = there;
+    edits_ = cases_folder() / name;
+    const std::string list = test::content(edits_);
+    std::istringstream line(list.substr(std::string("# osteon-import ").size(), list.find('\n')));
+    std::vector<std::string> arguments;
+    for (std::string word; line >> word && word != "--edits";) arguments.push_back(word);
+    const fs::path again = desk_->temp() / ("again-" + name);
+    arguments.insert(arguments.begin() + 1, folder().string());
+    arguments.insert(arguments.end(), {"--series", "1", "--edits", edits_.string(), "--out", again.string()});
+    const auto run = test::run(test::program("osteon-import"), arguments);
+    EXPECT_EQ(run.exit_code, 0) << run.err;
+    const auto repeated = Case::load(again);
+    auto made = Case::load(cases_folder() / name.substr(0, name.find(".edits")));
+    EXPECT_TRUE(repeated && made);
+    if (repeated && made) {
+      EXPECT_EQ(repeated->hash(), made->hash());
+    }
+    return made;
+  }
+  fs::path edits_;  // of the bone that was made last
+};
+
+// Half of a ball is left, with the name that a person has given it.
+TEST_F(ImagingEditsTest, ACutAndNamedBoneIsThatOfTheSameList) {
+  ImagingPlane& axial = plane("plane_axial");
+  double_click(axial, axial.pixel(ball(1)));
+  click("tool_cut");
+  // Down the screen: what is to its right is the left of the screen.
+  const auto [x, y, z] = ball(1);
+  drag(axial, {x, y - 14, z}, {x, y + 14, z});
+  const QColor gone = colour(axial, {x - 4, y - 3, z}), there = colour(axial, {x + 4, y - 3, z});
+  // Red, and the colour of an island.
+  EXPECT_GT(gone.red(), gone.green() + 50);
+  EXPECT_NEAR(gone.green(), gone.blue(), 3);
+  EXPECT_GT(std::abs(there.green() - there.blue()), 20);
+  auto& choice = part<QComboBox>("bone_choice");
+  ASSERT_EQ(choice.count(), 2);
+  choice.setCurrentIndex(1);
+  auto& name = part<QLineEdit>("bone_name");
+  EXPECT_EQ(name.text(), "bone 1");
+  name.selectAll();
+  QTest::keyClicks(&name, "Humerus");
+  QTest::keyClick(&name, Qt::Key_Return);
+  EXPECT_EQ(choice.itemText(1), "1: Humerus");
+  const auto made = made_twice();
+  ASSERT_TRUE(made) << made.error().message;
+  EXPECT_NEAR(made->volume_mm3(), 0.5 * test::kBall_mm3, 0.08 * test::kBall_mm3);
+  ASSERT_EQ(made->info().labels.size(), 1u);
+  EXPECT_EQ(made->info().labels[0].name, "Humerus");
+  EXPECT_TRUE(made->info().labels[0].provenance.parameters.contains("minutes"));
+  EXPECT_EQ(made->info().labels[0].provenance.edits.size(), 3u) << "seed, cut and label";
+}
+
+TEST_F(ImagingEditsTest, FilterBoxAndBrushMakeTheBoneOfTheSameList) {
+  auto& filter = part<QComboBox>("filter");
+  filter.setCurrentIndex(3);
+  emit filter.activated(3);
+  ASSERT_TRUE(until([&] { return found(2); })) << words();
+  ImagingPlane& axial = plane("plane_axial");
+  click("tool_box");
+  drag(axial, {31, 4, 12}, {58, 55, 12});
+  ASSERT_TRUE(until([&] { return found(1); })) << words();
+  click("tool_look");
+  const auto [x, y, z] = ball(1);
+  double_click(axial, axial.pixel(ball(1)));
+  click("tool_paint");
+  part<QDoubleSpinBox>("brush_radius").setValue(2.0);
+  drag(axial, {x, y, z}, {x, y - 14, z});
+  click("tool_erase");
+  part<QCheckBox>("brush_flat").setChecked(true);
+  drag(axial, {x - 6, y + 4, z}, {x + 6, y + 4, z});
+  const auto made = made_twice();
+  ASSERT_TRUE(made) << made.error().message;
+  const std::string list = test::content(edits_);
+  EXPECT_NE(list.find("--gaussian 0.5 --edits"), std::string::npos) << list;
+  for (const char* kind : {"kind: box", "kind: seed", "kind: scribble", "kind: erase"})
+    EXPECT_NE(list.find(kind), std::string::npos) << list;
+  // The painted rod sticks out of the ball. A sample of it, at a pitch of 0.9 mm: 14.4, -10.8 and 0.9 mm.
+  EXPECT_EQ(made->bone_number({16, -12, 1}), 1);
+}
+
+TEST_F(ImagingEditsTest, AFilterShowsInThePlanesAndIsUndone) {
+  ImagingPlane& axial = plane("plane_axial");
+  // Beside the ball's edge.
+  const auto [x, y, z] = ball(1);
+  QTest::mouseClick(&axial, Qt::LeftButton, {}, axial.pixel({x + 10, y, z}));
+  EXPECT_TRUE(label("readout").startsWith("40 HU")) << label("readout").toStdString();
+  auto& filter = part<QComboBox>("filter");
+  filter.setCurrentIndex(3);
+  emit filter.activated(3);
+  part<QDoubleSpinBox>("gaussian").setValue(2.0);
+  ASSERT_TRUE(until([&] { return found(2) && !label("readout").startsWith("40 HU"); })) << words();
+  click("undo_edit");
+  click("undo_edit");
+  ASSERT_TRUE(until([&] { return found(2) && label("readout").startsWith("40 HU"); })) << words();
+  EXPECT_EQ(filter.currentIndex(), 0);
+  EXPECT_FALSE(can_undo());
+  click("redo_edit");
+  EXPECT_TRUE(until([&] { return found(2) && filter.currentIndex() == 3; })) << words();
+}
+
+TEST_F(ImagingEditsTest, ABoxOnTwoPlanesLimitsTheSearchAndAClickTakesItAway) {
+  ImagingPlane &axial = plane("plane_axial"), &coronal = plane("plane_coronal");
+  click("tool_box");
+  drag(axial, {31, 4, 12}, {58, 55, 12});
+  ASSERT_TRUE(until([&] { return found(1); })) << words();
+  // Above the ball there is no bone.
+  drag(coronal, {31, 30, 20}, {58, 30, 23});
+  ASSERT_TRUE(until([&] { return words().find("threshold") != std::string::npos; })) << words();
+  EXPECT_FALSE(part<QPushButton>("make_bone").isEnabled());
+  click("undo_edit");
+  ASSERT_TRUE(until([&] { return found(1); })) << words();
+  QTest::mouseClick(&axial, Qt::LeftButton, {}, axial.pixel({40, 30, 12}));
+  ASSERT_TRUE(until([&] { return found(2); })) << words();
+  click("undo_edit");
+  EXPECT_TRUE(until([&] { return found(1); })) << words();
+}
+
+TEST_F(ImagingEditsTest, TheKeyboardPaintsAndEscapeTakesAStrokeBack) {
+  ImagingPlane& axial = plane("plane_axial");
+  QTest::mouseClick(&axial, Qt::LeftButton, {}, axial.pixel({29, 20, 12}));
+  click("tool_paint");
+  auto& radius = part<QDoubleSpinBox>("brush_radius");
+  radius.setValue(3.0);
+  QWheelEvent wheel(QPointF(40, 40), axial.mapToGlobal(QPoint(40, 40)), {}, {0, 240}, Qt::NoButton, Qt::ControlModifier,
+                    Qt::NoScrollPhase, false);
+  QApplication::sendEvent(&axial, &wheel);
+  EXPECT_EQ(radius.value(), 4.0);
+  EXPECT_EQ(axial.slice(), 12) << "with Ctrl the wheel stays in the slice";
+  // 2 voxels of 0.9 mm from the middle: within the brush.
+  const std::array<int, 3> beside{27, 18, 12};
+  const auto tinted = [&] {
+    const QColor seen = colour(axial, beside);
+    return std::abs(seen.red() - seen.blue()) > 30;
+  };
+  EXPECT_FALSE(tinted());
+  axial.setFocus();
+  QTest::keyClick(&axial, Qt::Key_Space);
+  EXPECT_TRUE(tinted()) << "at once";
+  QTest::keyClick(&axial, Qt::Key_Escape);
+  EXPECT_FALSE(tinted());
+  EXPECT_FALSE(can_undo());
+  QTest::keyClick(&axial, Qt::Key_Space);
+  QTest::keyClick(&axial, Qt::Key_Down);
+  QTest::keyClick(&axial, Qt::Key_Space);
+  EXPECT_TRUE(tinted());
+  EXPECT_TRUE(can_undo());
+  click("undo_edit");
+  EXPECT_FALSE(tinted());
+  click("redo_edit");
+  EXPECT_TRUE(tinted());
+  // A ball reaches the next slice, 1.5 mm away, and a disc does not.
+  part<QSlider>("slice_axial").setValue(13);
+  EXPECT_TRUE(tinted());
+  click("undo_edit");
+  part<QCheckBox>("brush_flat").setChecked(true);
+  part<QSlider>("slice_axial").setValue(12);
+  QTest::keyClick(&axial, Qt::Key_Space);
+  QTest::keyClick(&axial, Qt::Key_Space);
+  EXPECT_TRUE(tinted());
+  part<QSlider>("slice_axial").setValue(13);
+  EXPECT_FALSE(tinted());
+}
+
+TEST_F(ImagingEditsTest, ACutThatBeginsBesideEveryBoneSaysSo) {
+  ImagingPlane& axial = plane("plane_axial");
+  click("tool_cut");
+  drag(axial, {29, 4, 12}, {29, 50, 12});
+  EXPECT_NE(words().find("begins on no kept bone"), std::string::npos) << words();
+  EXPECT_FALSE(can_undo());
+  QTest::mouseClick(&axial, Qt::LeftButton, {}, axial.pixel({29, 20, 12}));
+  EXPECT_NE(words().find("Drag a line"), std::string::npos) << words();
+}
+
+// Seeds of one bone merge two islands, and the tint of a bone fades.
+TEST_F(ImagingEditsTest, SeedsOfOneBoneMergeAndItsTintFades) {
+  ImagingPlane& axial = plane("plane_axial");
+  double_click(axial, axial.pixel(ball(1)));
+  auto& choice = part<QComboBox>("bone_choice");
+  choice.setCurrentIndex(1);
+  double_click(axial, axial.pixel(ball(-1)));
+  EXPECT_EQ(choice.count(), 2) << "no second bone";
+  const auto [x, y, z] = ball(-1);
+  const std::array<int, 3> inside{x + 4, y + 3, z};
+  const auto strength = [&] {
+    const QColor seen = colour(axial, inside);
+    return std::max({seen.red(), seen.green(), seen.blue()}) - std::min({seen.red(), seen.green(), seen.blue()});
+  };
+  EXPECT_GT(strength(), 30);
+  part<QSpinBox>("bone_opacity").setValue(0);
+  EXPECT_LT(strength(), 3);
+  click("undo_edit");
+  EXPECT_GT(strength(), 30);
+  const auto made = made_twice();
+  ASSERT_TRUE(made) << made.error().message;
+  EXPECT_NEAR(made->volume_mm3(), 2.0 * test::kBall_mm3, 0.1 * test::kBall_mm3);
+  EXPECT_EQ(made->info().labels.size(), 1u);
+}
+
+}  // namespace
+}  // namespace osteon

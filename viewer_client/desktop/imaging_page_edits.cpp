@@ -1,0 +1,315 @@
+// The edits of the page of image processing: threshold, filter, seeds, strokes, cuts, box and labels.
+#include <QComboBox>
+#include <QDoubleSpinBox>
+#include <QLabel>
+#include <QListWidget>
+#include <QPushButton>
+#include <QSignalBlocker>
+#include <QSpinBox>
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <utility>
+
+#include "viewer_client/desktop/imaging_page.hpp"
+
+namespace osteon {
+
+namespace {
+
+// [A] Who pauses for longer does something else.
+constexpr double kLongestPause_min = 2.0;
+constexpr double kMsPerMinute = 60000.0;
+
+}  // namespace
+
+void ImagingPage::take_threshold() {
+  ImagingEdits edits = history_.now();
+  edits.threshold_hu = threshold_->value();
+  history_.apply(std::move(edits));
+}
+
+void ImagingPage::apply_threshold() {
+  take_threshold();
+  follow_edits();
+}
+
+void ImagingPage::take_filter() {
+  if (!scene_.open()) return;
+  take_threshold();
+  ImagingEdits edits = history_.now();
+  const int row = filter_->currentIndex();
+  edits.filter = {row == 1   ? MedianFilter::slice
+                  : row == 2 ? MedianFilter::volume
+                             : MedianFilter::none,
+                  row == kGaussianRow ? gaussian_->value() : 0.0};
+  history_.apply(std::move(edits));
+  follow_edits();
+}
+
+void ImagingPage::show_filter(const ScanFilter& filter) {
+  const QSignalBlocker quiet(filter_), quiet_sigma(gaussian_);
+  filter_->setCurrentIndex(filter.gaussian_mm > 0.0                ? kGaussianRow
+                           : filter.median == MedianFilter::slice  ? 1
+                           : filter.median == MedianFilter::volume ? 2
+                                                                   : 0);
+  if (filter.gaussian_mm > 0.0) gaussian_->setValue(filter.gaussian_mm);
+}
+
+void ImagingPage::take(ImagingEdits edits, int bone) {
+  if (edits == history_.now()) return refresh_list();
+  if (!is_listable(edits)) {
+    words_->setText(tr("The edit list is full, at 1000 edits or 1 MiB. Make the bone, or undo edits."));
+    refresh_list();
+    return refresh_planes();
+  }
+  if (bone != 0) {
+    const double minutes = static_cast<double>(work_.elapsed()) / kMsPerMinute;
+    own_label(edits, bone).minutes += std::min(kLongestPause_min, minutes);
+  }
+  work_.restart();
+  history_.apply(std::move(edits));
+  follow_edits();
+}
+
+int ImagingPage::bone_at(const std::array<int, 3>& voxel) const {
+  const std::bitset<256>& bones = scene_.look.kept[scene_.islands.number(voxel)];
+  for (std::size_t bone = 1; bone < bones.size(); ++bone)
+    if (bones.test(bone)) return static_cast<int>(bone);
+  return 0;
+}
+
+bool ImagingPage::kept(int island) const {
+  return std::ranges::any_of(history_.now().seeds, [&](const KeptSeed& seed) {
+    const auto voxel = voxel_of(scene_.scan.geometry, seed.at_mm);
+    return seed.bone != 0 && voxel && scene_.islands.number(*voxel) == island;
+  });
+}
+
+void ImagingPage::keep_at(const std::array<int, 3>& voxel) {
+  if (!keep_->isEnabled()) return;
+  const int island = scene_.islands.number(voxel);
+  const auto seed = island == 0 ? std::optional<std::array<int, 3>>()
+                                : scene_.islands.seed_near(scene_.scan, island, found_hu(), voxel);
+  if (!seed) return words_->setText(tr("There is no bone at the crosshair. Move it into a tinted part."));
+  ImagingEdits edits = history_.now();
+  const Vec3 at_mm = centre_of(scene_.scan.geometry, *seed);
+  if (std::ranges::find(edits.seeds, at_mm, &KeptSeed::at_mm) != edits.seeds.end()) return;
+  const int bone = choice_->bone() != 0 ? choice_->bone() : next_bone(edits);
+  edits.seeds.push_back({at_mm, bone});
+  words_->setText(tr("Part %1 is kept.").arg(island));
+  take(std::move(edits), bone);
+}
+
+void ImagingPage::keep_outside(const std::array<int, 3>& voxel) {
+  const int island = scene_.islands.number(voxel);
+  const auto seed = island == 0 ? std::optional<std::array<int, 3>>()
+                                : scene_.islands.seed_near(scene_.scan, island, found_hu(), voxel);
+  if (!seed) return words_->setText(tr("There is no bone at the crosshair. Move it into a tinted part."));
+  ImagingEdits edits = history_.now();
+  const Vec3 at_mm = centre_of(scene_.scan.geometry, *seed);
+  if (std::ranges::find(edits.seeds, at_mm, &KeptSeed::at_mm) != edits.seeds.end()) return;
+  edits.seeds.push_back({at_mm, 0});
+  words_->setText(tr("What touches a bone there is separated from it and left out."));
+  take(std::move(edits), bone_at(voxel));
+}
+
+void ImagingPage::change_island(const QListWidgetItem* item) {
+  const auto row = static_cast<std::size_t>(island_list_->row(item));
+  if (filling_ || row >= islands_.size()) return;
+  const ListedIsland& island = islands_[row];
+  const bool keep = item->checkState() == Qt::Checked;
+  if (keep == kept(island.number)) return;
+  ImagingEdits edits = history_.now();
+  int bone = 0;
+  if (keep) {
+    const auto centre = voxel_of(scene_.scan.geometry, island.centre_mm);
+    const auto seed =
+        scene_.islands.main_seed_near(scene_.scan, island.number, found_hu(), centre.value_or(scene_.crosshair));
+    bone = next_bone(edits);
+    if (seed) edits.seeds.push_back({centre_of(scene_.scan.geometry, *seed), bone});
+  } else {
+    std::erase_if(edits.seeds, [&](const KeptSeed& seed) {
+      const auto voxel = voxel_of(scene_.scan.geometry, seed.at_mm);
+      return voxel && scene_.islands.number(*voxel) == island.number;
+    });
+  }
+  take(std::move(edits), bone);
+}
+
+void ImagingPage::follow_tools() {
+  if (tools_ == nullptr) return;  // it is being made
+  for (ImagingPlane* plane : planes_)
+    if (plane != nullptr) plane->stop_drag();
+  scene_.tool = tools_->tool();
+  scene_.brush_mm = tools_->radius_mm();
+  refresh_planes();
+}
+
+void ImagingPage::begin_drag(const PlaneAxes& axes, const std::array<int, 3>& voxel) {
+  if (!keep_->isEnabled()) return;
+  drag_.emplace(scene_.tool, axes, voxel);
+  look_at(voxel);
+  show_drag();
+}
+
+void ImagingPage::drag_to(const std::array<int, 3>& voxel) {
+  if (!drag_) return;
+  drag_->move(voxel);
+  look_at(voxel);
+  show_drag();
+}
+
+namespace {
+
+// The bone that a drag works on: that under its first voxel, or else the last that was kept.
+int bone_of_drag(int chosen, int under, const ImagingEdits& edits) {
+  if (chosen != 0) return chosen;
+  if (under != 0) return under;
+  for (std::size_t i = edits.seeds.size(); i > 0; --i)
+    if (edits.seeds[i - 1].bone != 0) return edits.seeds[i - 1].bone;
+  return next_bone(edits);
+}
+
+}  // namespace
+
+void ImagingPage::show_drag() {
+  refresh_look();
+  const ScanGeometry& scan = scene_.scan.geometry;
+  const int bone = bone_of_drag(choice_->bone(), bone_at(drag_->first()), history_.now());
+  const auto show = [&](Correction correction) {
+    scene_.look.corrections.push_back(std::make_shared<const Correction>(std::move(correction)));
+  };
+  switch (drag_->tool()) {
+    case ImagingTool::paint:
+    case ImagingTool::erase:
+      show(drag_->stroke(scan, bone, tools_->radius_mm(), tools_->flat()));
+      break;
+    case ImagingTool::cut:
+      if (auto cut = drag_->cut(scan, bone)) show(std::move(*cut));
+      break;
+    case ImagingTool::box:
+      if (drag_->first() != drag_->last()) scene_.look.box = drag_->box(scan, history_.now().box);
+      break;
+    default:
+      break;
+  }
+  refresh_planes();
+}
+
+void ImagingPage::end_drag(bool keep) {
+  const std::optional<PlaneDrag> drag = std::exchange(drag_, std::nullopt);
+  if (!drag) return;
+  refresh_look();
+  refresh_planes();
+  if (!keep) return;
+  const ScanGeometry& scan = scene_.scan.geometry;
+  ImagingEdits edits = history_.now();
+  const int under = bone_at(drag->first()), bone = bone_of_drag(choice_->bone(), under, edits);
+  switch (drag->tool()) {
+    case ImagingTool::paint:
+    case ImagingTool::erase:
+      edits.corrections.push_back(
+          std::make_shared<const Correction>(drag->stroke(scan, bone, tools_->radius_mm(), tools_->flat())));
+      return take(std::move(edits), bone);
+    case ImagingTool::cut: {
+      auto cut = drag->cut(scan, bone);
+      if (!cut) return words_->setText(tr("Drag a line through the bone. What is to its right is cut off."));
+      if (choice_->bone() == 0 && under == 0)
+        return words_->setText(tr("The line begins on no kept bone. Begin on one, or choose the bone."));
+      edits.corrections.push_back(std::make_shared<const Correction>(std::move(*cut)));
+      return take(std::move(edits), bone);
+    }
+    case ImagingTool::box:
+      edits.box = drag->box(scan, edits.box);
+      return take(std::move(edits), 0);
+    case ImagingTool::outside:
+      return keep_outside(drag->first());
+    default:
+      return;
+  }
+}
+
+void ImagingPage::name_bone(int bone, const QString& name) {
+  ImagingEdits edits = history_.now();
+  const std::string text = name.trimmed().toStdString();
+  if (!may_be_called(edits, bone, text)) {
+    words_->setText(tr("No bone can be called that. Write a short name that no other bone has."));
+    return choice_->follow(edits);
+  }
+  own_label(edits, bone).name = text;
+  take(std::move(edits), bone);
+}
+
+void ImagingPage::fade_bone(int bone, int percent) {
+  if (bone == 0) return;
+  ImagingEdits edits = history_.now();
+  own_label(edits, bone).opacity_percent = percent;
+  take(std::move(edits), 0);
+}
+
+void ImagingPage::follow_edits() {
+  const ImagingEdits& edits = history_.now();
+  const QSignalBlocker quiet(threshold_);
+  threshold_->setValue(static_cast<int>(edits.threshold_hu));
+  histogram_->set_limits(edits.threshold_hu, scene_.look.window);
+  threshold_timer_.stop();
+  show_filter(edits.filter);
+  choice_->follow(edits);
+  if (wanted() != found_) {
+    scene_.look.threshold_hu = edits.threshold_hu;
+    refresh_look();
+    find_islands();
+  } else {
+    scene_.look.threshold_hu.reset();
+    refresh_list();
+  }
+  refresh_planes();
+  enable_parts();
+}
+
+void ImagingPage::refresh_look() {
+  const ImagingEdits& edits = history_.now();
+  PlaneLook& look = scene_.look;
+  look.corrections = edits.corrections;
+  look.box = edits.box;
+  look.kept = {};
+  scene_.seeds.clear();
+  for (std::size_t bone = 1; bone < look.bones.size(); ++bone) look.bones[bone] = tint_of(static_cast<int>(bone), true);
+  std::array<int, 256> first_bone{};  // of each island
+  for (const KeptSeed& seed : edits.seeds) {
+    const auto voxel = scene_.open() ? voxel_of(scene_.scan.geometry, seed.at_mm) : std::nullopt;
+    if (!voxel) continue;
+    scene_.seeds.push_back({*voxel, seed.bone == 0});
+    const auto island = static_cast<std::size_t>(scene_.islands.number(*voxel));
+    if (island == 0 || seed.bone == 0) continue;
+    look.kept[island].set(static_cast<std::size_t>(seed.bone));
+    if (first_bone[island] == 0) first_bone[island] = seed.bone;
+  }
+  for (std::size_t island = 1; island < look.islands.size(); ++island) {
+    look.islands[island] = tint_of(static_cast<int>(island), first_bone[island] != 0);
+    if (first_bone[island] != 0) look.bones[static_cast<std::size_t>(first_bone[island])] = look.islands[island];
+  }
+  const auto fade = [](Tint& tint, const BoneLabel& label) {
+    tint.strength = static_cast<std::uint8_t>(std::lround(tint.strength * label.opacity_percent / 100.0));
+  };
+  for (const BoneLabel& label : edits.labels) {
+    fade(look.bones[static_cast<std::size_t>(label.bone)], label);
+    for (std::size_t island = 1; island < look.islands.size(); ++island)
+      if (first_bone[island] == label.bone) fade(look.islands[island], label);
+  }
+}
+
+void ImagingPage::make_bone() {
+  show_work(tr("The bone is being made"));
+  const ImagingEdits& edits = history_.now();
+  std::vector<KeptSeed> seeds;
+  for (const KeptSeed& seed : edits.seeds)
+    for (const Vec3& at_mm : scene_.islands.moved_seeds(scene_.scan, found_hu(), {&seed.at_mm, 1}))
+      if (std::ranges::find(seeds, at_mm, &KeptSeed::at_mm) == seeds.end()) seeds.push_back({at_mm, seed.bone});
+  steps_.make(made_edits(edits, std::move(seeds), scene_.scan.geometry));
+  events_.busy(steps_.making());
+  enable_parts();
+}
+
+}  // namespace osteon

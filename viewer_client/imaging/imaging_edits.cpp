@@ -1,0 +1,154 @@
+#include "viewer_client/imaging/imaging_edits.hpp"
+
+#include <algorithm>
+#include <array>
+#include <bitset>
+#include <charconv>
+#include <cmath>
+#include <utility>
+
+#include "common/core/bounded_text.hpp"
+#include "viewer_client/imaging/corrected_plane.hpp"
+
+namespace osteon {
+
+namespace {
+
+// Limits of osteon-import.
+constexpr std::size_t kMostStrokePoints = 1000, kMostListedEdits = 1000, kMostListBytes = 1 << 20, kMostNameBytes = 60;
+
+// All digits that bring it back, with a point in every locale.
+std::string digits_of(double value) {
+  std::array<char, 32> digits{};
+  return {digits.data(), std::to_chars(digits.data(), digits.data() + digits.size(), value).ptr};
+}
+
+std::string triple(const Vec3& at) {
+  return "[" + digits_of(at.x()) + ", " + digits_of(at.y()) + ", " + digits_of(at.z()) + "]";
+}
+
+std::string quoted(const std::string& text) {
+  std::string all = "\"";
+  for (const char c : text) {
+    if (c == '"' || c == '\\') all += '\\';
+    all += c;
+  }
+  return all + '"';
+}
+
+std::string entry(const std::string& kind, const std::string& fields) {
+  return "  - {kind: " + kind + ", " + fields + "}\n";
+}
+
+// Edits of a stroke from its point `first` on, as many points as one may have. The next ones begin where it ends.
+std::string stroke_text(const Correction& stroke) {
+  const bool paints = stroke.kind == CorrectionKind::paint;
+  const std::string bone = paints ? "bone: " + std::to_string(stroke.bone) + ", " : "";
+  std::string rest = ", radius_mm: " + digits_of(stroke.radius_mm);
+  if (stroke.normal != Vec3::Zero()) rest += ", normal: " + triple(stroke.normal);
+  const std::vector<Vec3>& points = stroke.points_mm;
+  if (points.size() == 1) return entry(paints ? "paint" : "erase", bone + "centre_mm: " + triple(points[0]) + rest);
+  std::string text;
+  for (std::size_t first = 0; first + 1 < points.size(); first += kMostStrokePoints - 1) {
+    std::string list;
+    for (std::size_t i = first; i < std::min(points.size(), first + kMostStrokePoints); ++i)
+      list += (list.empty() ? "" : ", ") + triple(points[i]);
+    text += entry(paints ? "scribble" : "erase", bone + "points_mm: [" + list + "]" + rest);
+  }
+  return text;
+}
+
+std::string correction_text(const Correction& correction) {
+  if (correction.kind != CorrectionKind::cut) return stroke_text(correction);
+  return entry("cut", "bone: " + std::to_string(correction.bone) + ", point_mm: " +
+                          triple(correction.points_mm.front()) + ", normal: " + triple(correction.normal));
+}
+
+std::string seed_text(const KeptSeed& seed) {
+  if (seed.bone == 0) return entry("outside", "point_mm: " + triple(seed.at_mm));
+  return entry("seed", "point_mm: " + triple(seed.at_mm) + ", bone: " + std::to_string(seed.bone));
+}
+
+std::string label_text(const BoneLabel& label) {
+  return entry("label", "bone: " + std::to_string(label.bone) + ", name: " + quoted(label.name) +
+                            ", opacity: " + digits_of(label.opacity_percent / 100.0) +
+                            ", minutes: " + digits_of(std::round(100.0 * label.minutes) / 100.0));
+}
+
+}  // namespace
+
+std::string plain_name(int bone) { return "bone " + std::to_string(bone); }
+
+int next_bone(const ImagingEdits& edits) {
+  std::bitset<kMostBones + 1> taken;
+  for (const KeptSeed& seed : edits.seeds) taken.set(static_cast<std::size_t>(seed.bone));
+  for (const SharedCorrection& correction : edits.corrections) taken.set(static_cast<std::size_t>(correction->bone));
+  for (const BoneLabel& label : edits.labels)
+    if (label.name != plain_name(label.bone)) taken.set(static_cast<std::size_t>(label.bone));
+  int bone = 1;
+  while (bone < kMostBones && taken.test(static_cast<std::size_t>(bone))) ++bone;
+  return bone;
+}
+
+const BoneLabel* label_of(const ImagingEdits& edits, int bone) {
+  const auto found = std::ranges::find(edits.labels, bone, &BoneLabel::bone);
+  return found != edits.labels.end() ? &*found : nullptr;
+}
+
+BoneLabel& own_label(ImagingEdits& edits, int bone) {
+  const auto found = std::ranges::find(edits.labels, bone, &BoneLabel::bone);
+  if (found != edits.labels.end()) return *found;
+  return edits.labels.emplace_back(BoneLabel{bone, plain_name(bone), 100, 0.0});
+}
+
+std::vector<std::string> filter_options(const ScanFilter& filter) {
+  std::vector<std::string> options;
+  if (filter.median != MedianFilter::none)
+    options.insert(options.end(), {"--median", filter.median == MedianFilter::slice ? "slice" : "volume"});
+  if (filter.gaussian_mm > 0.0) options.insert(options.end(), {"--gaussian", digits_of(filter.gaussian_mm)});
+  return options;
+}
+
+std::string edit_list_text(const ImagingEdits& edits) {
+  std::string text = "# osteon-import ct --threshold " + digits_of(edits.threshold_hu);
+  for (const std::string& option : filter_options(edits.filter)) text += " " + option;
+  text += " --edits THIS_FILE\nedits:\n";
+  if (edits.box)
+    text +=
+        entry("box", "corner_mm: " + triple(edits.box->corner_mm) + ", opposite_mm: " + triple(edits.box->opposite_mm));
+  for (const KeptSeed& seed : edits.seeds) text += seed_text(seed);
+  for (const SharedCorrection& correction : edits.corrections) text += correction_text(*correction);
+  for (const BoneLabel& label : edits.labels) text += label_text(label);
+  return text;
+}
+
+bool is_listable(const ImagingEdits& edits) {
+  const std::string text = edit_list_text(edits);
+  const auto lines = static_cast<std::size_t>(std::ranges::count(text, '\n'));
+  return text.size() <= kMostListBytes && lines <= kMostListedEdits + 2;  // a comment and the key come first
+}
+
+bool may_be_called(const ImagingEdits& edits, int bone, const std::string& name) {
+  if (name.empty() || name.size() > kMostNameBytes || bounded_text(name) != name) return false;
+  if (name.starts_with("bone ") && name != plain_name(bone)) return false;
+  return std::ranges::none_of(edits.labels,
+                              [&](const BoneLabel& label) { return label.bone != bone && label.name == name; });
+}
+
+ImagingEdits made_edits(const ImagingEdits& edits, std::vector<KeptSeed> seeds, const ScanGeometry& scan) {
+  ImagingEdits made = edits;
+  made.seeds = std::move(seeds);
+  made.corrections.clear();
+  std::bitset<kMostBones + 1> there;
+  for (const KeptSeed& seed : made.seeds) there.set(static_cast<std::size_t>(seed.bone));
+  const VoxelRange range = range_of(scan, edits.box);
+  for (const SharedCorrection& correction : edits.corrections) {
+    const bool cuts = correction->kind == CorrectionKind::cut;
+    if (cuts ? !there.test(static_cast<std::size_t>(correction->bone)) : !reaches(scan, range, *correction)) continue;
+    if (correction->kind == CorrectionKind::paint) there.set(static_cast<std::size_t>(correction->bone));
+    made.corrections.push_back(correction);
+  }
+  return made;
+}
+
+}  // namespace osteon
