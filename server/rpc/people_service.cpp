@@ -181,12 +181,12 @@ class PeopleServiceImpl final : public PeopleBase {
                                        v1::ShareShotsResponse*) override {
     grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
     if (!admitted<v1::ShareShotsRequest>(rooms_, *context, reactor)) return reactor;
+    const std::shared_ptr<OpenRoom> room = room_of_member(rooms_, *context, reactor, *request);
+    if (!room) return reactor;
     const Result<ShotRun> run = wire::from_wire(request->run());
     if (!run) return refuse(reactor, invalid(run.error().message));
     const Result<ShotTotals> session = wire::from_wire(request->session());
     if (!session) return refuse(reactor, invalid(session.error().message));
-    const std::shared_ptr<OpenRoom> room = room_of_member(rooms_, *context, reactor, *request);
-    if (!room) return reactor;
     room->runtime().people().shot(AuthorId{request->author()}, *run, *session);
     reactor->Finish(Status::OK);
     return reactor;
