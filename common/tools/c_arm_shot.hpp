@@ -1,7 +1,9 @@
 // What is kept of each shot of a C-arm, and what a room is told of it. A record says all that the picture depends on
 // but the bone and the tools, so whoever has those can make the picture again.
 #pragma once
+#include <algorithm>
 #include <cstdint>
+#include <functional>
 
 #include "common/core/id.hpp"
 #include "common/core/result.hpp"
@@ -58,6 +60,15 @@ struct ShotRun {
 
 [[nodiscard]] inline bool same_press(const ShotRun& a, const ShotRun& b) {
   return a.author == b.author && a.first_number == b.first_number;
+}
+
+// Where too many are kept: an iterator to the one that goes, the first one of whoever has most. So nobody's shots push
+// out those of the others. `run_of`: the ShotRun of an entry. `runs` is not empty.
+template <class Runs, class RunOf = std::identity>
+[[nodiscard]] auto surplus_run(const Runs& runs, RunOf run_of = {}) {
+  const auto author_of = [&](const auto& entry) { return std::invoke(run_of, entry).author; };
+  return std::ranges::max_element(
+      runs, {}, [&](const auto& entry) { return std::ranges::count(runs, author_of(entry), author_of); });
 }
 
 // Limits of a record, from files and from the network.

@@ -103,7 +103,7 @@ void Presence::shot(AuthorId author, ShotRun run, const ShotTotals& session) {
   entry->shots = session;
   if (known != runs_.end()) runs_.erase(known);
   runs_.push_back({++runs_told_, std::move(run)});
-  if (runs_.size() > kMostRuns) runs_.pop_front();
+  if (runs_.size() > kMostRuns) runs_.erase(surplus_run(runs_, &RunEntry::run));
 }
 
 std::vector<AuthorId> Presence::supervised_hands() const {

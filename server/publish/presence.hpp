@@ -45,7 +45,7 @@ class Presence {
  public:
   using Clock = std::chrono::steady_clock;
   static constexpr std::size_t kMostWords = 64;    // the latest ones
-  static constexpr std::size_t kMostRuns = 64;     // of shots; the latest ones
+  static constexpr std::size_t kMostRuns = 64;     // of shots; beyond, see surplus_run()
   static constexpr std::size_t kMostAbsent = 256;  // people who have left; the latest ones
   static constexpr std::chrono::milliseconds kApart{100};
 

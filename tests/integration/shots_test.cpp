@@ -9,6 +9,7 @@
 #include <QPushButton>
 #include <QSettings>
 #include <QTreeWidget>
+#include <optional>
 
 #include "osteon/v1/people.pb.h"
 #include "server/rpc/room_server.hpp"
@@ -38,6 +39,7 @@ class OtherCArm {
     events.say = [](const QString& sentence) { ADD_FAILURE() << sentence.toStdString(); };
     events.shots = [this] { return ShotsOfAll{room_->self(), room_->people(), room_->shots()}; };
     events.share = [this](const SharedShots::Message& message, RoomLink::Answered answered) {
+      if (refusal_) return ++refused_, answered(tl::unexpected(*refusal_));
       room_->ask([message](RoomSubscription& room) { return room.share_shots(message.run, message.session); },
                  std::move(answered));
     };
@@ -52,8 +54,13 @@ class OtherCArm {
   OtherCArm& operator=(const OtherCArm&) = delete;
 
   [[nodiscard]] CArmPanel& panel() const { return *panel_; }
+  // What the room answers in place of taking a shot. None: it takes them.
+  void refuse(const std::optional<Error>& why) { refusal_ = why; }
+  [[nodiscard]] int refused() const { return refused_; }
 
  private:
+  std::optional<Error> refusal_;
+  int refused_ = 0;
   InsideLink inside_;
   std::unique_ptr<RoomLink> room_;
   std::unique_ptr<CArmPanel> panel_;
@@ -151,7 +158,7 @@ TEST_F(ShotsTest, EverybodySeesTheShotsOfTheOthers) {
   QTest::keyClick(&of_ada, Qt::Key_Down);
   expect_seen(ada, *lateral);
   EXPECT_THAT(text_of(ada, "c_arm_words"),
-              HasSubstr("ben, shot 1: made again from the bone and the tools as they are"));
+              HasSubstr("ben, shot 1: made again from the bone and the tools as they were at "));
   EXPECT_TRUE(button_of(ada, "c_arm_save")->isEnabled());
 
   // Live, the newest picture follows, and so do the counts.
@@ -185,6 +192,70 @@ TEST_F(ShotsTest, EverybodySeesTheShotsOfTheOthers) {
   EXPECT_EQ(ben.console().totals().shots, shots);
   of_ben.setCurrentItem(of_ben.topLevelItem(1));
   expect_seen(ben, *ada.picture());
+}
+
+TEST_F(ShotsTest, WhatARoomDidNotTakeIsSharedLater) {
+  join("ben", Role::trainee);
+  OtherCArm other_arm(other("ada", Role::instructor));
+  const CArmPanel& ada = other_arm.panel();
+  ASSERT_TRUE(until([&] { return button_of(ada, "c_arm_shot")->isEnabled(); }));
+  const QTreeWidget& of_ben = tree_of(panel());
+
+  // A room that was away gets the last shot when it is back.
+  other_arm.refuse(Error{ErrorCode::unavailable, "the server does not answer"});
+  (void)shoot(ada);
+  ASSERT_TRUE(until([&] { return other_arm.refused() >= 2; })) << "it is tried again";
+  EXPECT_FALSE(of_ben.isVisible());
+  other_arm.refuse({});
+  ASSERT_TRUE(until([&] { return of_ben.isVisible(); }));
+  EXPECT_EQ(of_ben.topLevelItem(1)->text(1), "1");
+
+  // A refusal holds until the next press.
+  other_arm.refuse(Error{ErrorCode::denied, "not now"});
+  (void)shoot(ada);
+  EXPECT_TRUE(until([&] {
+    return text_of(ada, "c_arm_words").find("The others do not see your shots: not now") != std::string::npos;
+  }));
+  other_arm.refuse({});
+  (void)shoot(ada);
+  EXPECT_TRUE(until([&] { return of_ben.topLevelItem(1)->text(1) == "3"; }));
+  EXPECT_TRUE(until([&] { return text_of(ada, "c_arm_words").empty(); })) << text_of(ada, "c_arm_words");
+}
+
+// A room keeps the latest presses only.
+TEST_F(ShotsTest, APersonIsLookedAtWithWhatTheRoomHas) {
+  constexpr AuthorId kBen{2}, kCarl{3};
+  PersonSeen ben, carl;
+  ben.author = kBen;
+  ben.name = "ben";
+  ben.shots = {2, 0.04, 0.001};
+  carl.author = kCarl;
+  carl.name = "carl";
+  carl.shots = {1, 0.02, 0.001};
+  const ShotRun first{kBen, 1, 0.02, {.number = 1}}, second{kBen, 2, 0.02, {.number = 2}};
+  std::optional<ShotRun> told;
+  OthersShots tree([&](const std::optional<ShotRun>& run) { told = run; });
+  tree.take({AuthorId{1}, {ben, carl}, {first, second}});
+  EXPECT_FALSE(tree.of_other());
+
+  // Both kinds of rows keep what is looked at.
+  QTreeWidgetItem& row = *tree.topLevelItem(1);
+  ASSERT_EQ(row.text(0), "ben");
+  tree.setCurrentItem(&row);
+  EXPECT_EQ(told, second);
+  tree.take({AuthorId{1}, {ben, carl}, {}});
+  EXPECT_EQ(told, second);
+  ASSERT_EQ(row.childCount(), 1);
+  tree.setCurrentItem(row.child(0));
+  tree.take({AuthorId{1}, {ben, carl}, {}});
+  EXPECT_EQ(told, second);
+
+  // Of a person without a press nothing is shown, and no own picture either.
+  tree.setCurrentItem(tree.topLevelItem(2));
+  EXPECT_EQ(told, std::nullopt);
+  EXPECT_TRUE(tree.of_other());
+  tree.choose_own();
+  EXPECT_FALSE(tree.of_other());
 }
 
 TEST_F(ShotsTest, AnObserversShotsStayInTheirWindow) {

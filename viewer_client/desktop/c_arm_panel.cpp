@@ -16,6 +16,7 @@
 #include <QPushButton>
 #include <QSlider>
 #include <QStringList>
+#include <QTime>
 #include <QVBoxLayout>
 #include <algorithm>
 #include <cmath>
@@ -366,23 +367,26 @@ void CArmPanel::show_status() {
 QString CArmPanel::words_about(const InsideStatus& now) const {
   QStringList words;
   if (others_->shown())
-    words << tr("%1: made again from the bone and the tools as they are now.").arg(others_->title(*others_->shown()));
+    words << tr("%1: made again from the bone and the tools as they were at %2.")
+                 .arg(others_->title(*others_->shown()), others_time_);
+  else if (others_->of_other())
+    words << tr("The room has no picture of this person any more.");
   if (now.state == InsideState::interrupted) words << tr("The connection is lost. Pictures show the bone as it was.");
   if (!fault_.isEmpty()) words << fault_;
   if (observes_)
     words << tr("You are an observer: the others do not see your shots.");
-  else if (!not_shared_.isEmpty())
-    words << tr("The others do not see your shots: %1").arg(not_shared_);
+  else if (not_shared_)
+    words << tr("The others do not see your shots: %1").arg(QString::fromStdString(not_shared_->message));
   return words.join(' ');
 }
 
 const ScreenPicture& CArmPanel::shown() const {
-  if (others_->shown()) return others_shot_;
+  if (others_->of_other()) return others_shot_;
   return maximum() ? projection_ : shot_;
 }
 
 void CArmPanel::show_screens() {
-  const bool others = others_->shown().has_value();
+  const bool others = others_->of_other();
   last_->show_picture(shown(), others ? tr("A picture of another person") : tr("The last picture"));
   before_->show_picture(maximum() || others ? ScreenPicture() : shot_before_, tr("The picture before it"));
 }
@@ -415,7 +419,7 @@ void CArmPanel::leave() {
   shared_.begin();
   share_timer_.stop();
   observes_ = false;
-  not_shared_.clear();
+  not_shared_.reset();
   others_->reset();
   kind_->setCurrentIndex(0);
   show_screens();
@@ -457,6 +461,8 @@ void CArmPanel::press(ShotMode mode) {
   others_->choose_own();
   console_.press(mode, CArmConsole::Clock::now());
   run_begins_ = true;
+  // What was refused once may be taken now, but a server that is too old stays so.
+  if (not_shared_ && not_shared_->code != ErrorCode::unsupported) not_shared_.reset();
   pedal_timer_.start();
   tick();
 }
@@ -517,16 +523,20 @@ void CArmPanel::keep_shot() {
 
 // The room is told of what was shot also after the panel was hidden.
 void CArmPanel::share() {
-  if (observes_ || !not_shared_.isEmpty()) shared_.begin();
+  if (observes_ || not_shared_) shared_.begin();
   if (shared_.idle()) return share_timer_.stop();
   share_timer_.start();
   const std::optional<SharedShots::Message> message = shared_.due(SharedShots::Clock::now());
   if (!message) return;
-  events_.share(*message, [this](const Result<RoomAnswer>& answer) {
+  events_.share(*message, [this, run = message->run](const Result<RoomAnswer>& answer) {
     shared_.answered();
-    // A room that is away for a while gets the next one.
-    if (answer || answer.error().code == ErrorCode::unavailable || answer.error().code == ErrorCode::cancelled) return;
-    not_shared_ = QString::fromStdString(answer.error().message);
+    if (answer || answer.error().code == ErrorCode::cancelled) return;
+    // A room that is away for a while gets it later.
+    if (answer.error().code == ErrorCode::unavailable) {
+      shared_.put_back(run);
+      return share_timer_.start();
+    }
+    not_shared_ = answer.error();
     show_status();
   });
 }
@@ -541,11 +551,16 @@ void CArmPanel::take_others() {
 
 void CArmPanel::show_others(const std::optional<ShotRun>& run) {
   others_picture_.reset();
-  // While a press goes on, its last picture stays until the next one is there.
-  if (!run || !others_run_ || !same_press(*run, *others_run_)) others_shot_ = {};
+  // While a press goes on, its last picture stays until the next one is there, and each that comes is shown: the next
+  // one may be asked for before this one is there.
+  if (!run || !others_run_ || !same_press(*run, *others_run_)) {
+    others_shot_ = {};
+    others_first_id_ = others_id_ + 1;
+  }
   others_run_ = run;
+  if (others_->of_other()) kind_->setCurrentIndex(0);
   if (run) {
-    kind_->setCurrentIndex(0);
+    others_time_ = QTime::currentTime().toString("HH:mm:ss");
     others_image_->make_again(++others_id_, run->last, metal_in_beam());
     inside_.wake();
   } else {
@@ -557,7 +572,7 @@ void CArmPanel::show_others(const std::optional<ShotRun>& run) {
 
 void CArmPanel::receive_others(const std::shared_ptr<const CArmPicture>& picture) {
   // One of an earlier choice may still be on its way.
-  if (!others_->shown() || picture->order != others_id_) return;
+  if (!others_->shown() || picture->order < others_first_id_) return;
   others_picture_ = picture;
   others_shot_ = screen_picture(*picture);
   show_screens();

@@ -69,7 +69,7 @@ class CArmPanel : public QWidget {
   [[nodiscard]] const CArmConsole& console() const { return console_; }
   // Of the last shot. Null: there is none in this window.
   [[nodiscard]] const std::shared_ptr<const CArmPicture>& picture() const { return picture_; }
-  // Of another person, made again here. Null: the own ones are shown, or it is not there yet.
+  // Of another person, made again here. Null: the own ones are shown, or there is none yet.
   [[nodiscard]] const std::shared_ptr<const CArmPicture>& others_picture() const { return others_picture_; }
   // Writes the picture that is shown. Error: exists, unless `replace`; not_found (no picture); internal.
   [[nodiscard]] Result<void> save(const std::filesystem::path& file, bool replace) const;
@@ -132,12 +132,14 @@ class CArmPanel : public QWidget {
   QTimer pedal_timer_, status_timer_, share_timer_;
 
   SharedShots shared_;
-  bool observes_ = false;  // the others are not told
-  QString not_shared_;     // why the room does not take them
+  bool observes_ = false;            // the others are not told
+  std::optional<Error> not_shared_;  // why the room does not take them
   OthersShots* others_ = nullptr;
   std::shared_ptr<CArmImage> others_image_;  // shared with the inside of the bone
   std::uint64_t others_id_ = 0;              // of the newest picture that others_image_ was asked for
-  std::optional<ShotRun> others_run_;        // the press that it is of
+  std::uint64_t others_first_id_ = 1;        // of the first one of the same press
+  std::optional<ShotRun> others_run_;        // the press that they are of
+  QString others_time_;                      // when the newest picture was asked for
   std::shared_ptr<const CArmPicture> others_picture_;
 
   std::shared_ptr<const CArmPicture> picture_;

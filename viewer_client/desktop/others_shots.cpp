@@ -29,7 +29,7 @@ OthersShots::OthersShots(Chosen chosen) : chosen_(std::move(chosen)) {
   setObjectName("c_arm_others");
   setAccessibleName(tr("Shots of the others in the room"));
   setToolTip(tr("Of a person the newest picture is shown, of a line below it that press.") + ' ' +
-             tr("The picture is made again from the bone and the tools as they are now."));
+             tr("The picture is made again from the bone and the tools as they are when you choose it."));
   setColumnCount(kShotColumns);
   setHeaderLabels({tr("Pictures of"), tr("Shots"), "s", "Gy cm²"});
   headerItem()->setToolTip(kSeconds, tr("Exposure, seconds"));
@@ -83,8 +83,7 @@ void OthersShots::take_people(const ShotsOfAll& all) {
 
 void OthersShots::take_runs(const ShotsOfAll& all) {
   // What is looked at stays, also when the room has forgotten it.
-  std::optional<ShotRun> kept;
-  if (currentItem() != nullptr && currentItem()->parent() != nullptr) kept = chosen_run();
+  const std::optional<ShotRun>& kept = shown_;
   runs_.clear();
   if (kept && people_.contains(kept->author)) runs_.push_back(*kept);
   for (const ShotRun& run : all.runs) {
@@ -134,8 +133,10 @@ std::optional<ShotRun> OthersShots::chosen_run() const {
 
 void OthersShots::show_chosen() {
   const std::optional<ShotRun> run = chosen_run();
-  if (run == shown_) return;
+  const bool of_other = currentItem() != nullptr && currentItem() != own_;
+  if (run == shown_ && of_other == of_other_) return;
   shown_ = run;
+  of_other_ = of_other;
   chosen_(shown_);
 }
 

@@ -25,7 +25,8 @@ class OthersShots : public QTreeWidget {
   Q_DECLARE_TR_FUNCTIONS(OthersShots)
 
  public:
-  // `chosen` gets the press whose last picture is to be shown now; none: the own pictures. Also when a press goes on.
+  // `chosen` gets the press whose last picture is to be shown now. None: the own pictures, unless of_other(). Also when
+  // a press goes on.
   using Chosen = std::function<void(const std::optional<ShotRun>&)>;
   explicit OthersShots(Chosen chosen);
 
@@ -34,6 +35,8 @@ class OthersShots : public QTreeWidget {
   // No room any more.
   void reset();
   [[nodiscard]] const std::optional<ShotRun>& shown() const { return shown_; }
+  // Another person is chosen. Without shown(): the room has no picture of theirs.
+  [[nodiscard]] bool of_other() const { return of_other_; }
   // Who shot and which shot: "Ben, shot 12".
   [[nodiscard]] QString title(const ShotRun& run) const;
 
@@ -53,6 +56,7 @@ class OthersShots : public QTreeWidget {
   std::map<AuthorId, PersonRow> people_;
   std::vector<ShotRun> runs_;  // of the others; the newest last
   std::optional<ShotRun> shown_;
+  bool of_other_ = false;
 };
 
 }  // namespace osteon

@@ -41,8 +41,8 @@ class CArmImage final : public InsidePainter {
   // Makes this picture at the next paint(). A newer order takes the place of one that waits. [any thread]
   void make(const ShotOrder& order, std::int64_t time_unix_ms, std::vector<PlacedMetal> metal);
   // The same for a shot that was made before, by this window or another: from where it stood, with its kerma and its
-  // noise. `id` takes the place of an order's. With the same bone and metal it is the same picture, to the last bit.
-  // [any thread]
+  // noise. `id` takes the place of an order's. With the same bone and metal, and by the same program and libraries, it
+  // is the same picture, to the last bit. [any thread]
   void make_again(std::uint64_t id, const CArmShot& shot, std::vector<PlacedMetal> metal);
   // Shows a maximum intensity projection from there, and again after each change of the bone. None: no more.
   // [any thread]

@@ -1,5 +1,7 @@
 #include "viewer_client/inside/shared_shots.hpp"
 
+#include <algorithm>
+
 namespace osteon {
 
 void SharedShots::add(const CArmShot& shot, bool first, const ShotTotals& session) {
@@ -20,6 +22,11 @@ std::optional<SharedShots::Message> SharedShots::due(Clock::time_point now) {
   Message message{waiting_.front(), session_};
   waiting_.pop_front();
   return message;
+}
+
+void SharedShots::put_back(const ShotRun& run) {
+  const auto is_newer = [&](const ShotRun& waiting) { return same_press(waiting, run); };
+  if (waiting_.size() < kMostWaiting && std::ranges::none_of(waiting_, is_newer)) waiting_.push_front(run);
 }
 
 }  // namespace osteon

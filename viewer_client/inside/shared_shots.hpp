@@ -29,6 +29,8 @@ class SharedShots {
   // The message to send now, if there is one. Then nothing until answered(). Each press in turn, oldest first.
   [[nodiscard]] std::optional<Message> due(Clock::time_point now);
   void answered() { under_way_ = false; }
+  // The room was not there for it. It waits again, unless a newer state of its press does.
+  void put_back(const ShotRun& run);
   [[nodiscard]] bool idle() const { return waiting_.empty(); }  // nothing waits
 
  private:

@@ -164,7 +164,7 @@ Result<void> PeopleClient::Impl::take(const v1::WatchPeopleResponse& news) {
   for (const ShotRun& run : shot) {
     std::erase_if(runs, [&](const ShotRun& known) { return same_press(known, run); });
     runs.push_back(run);
-    if (runs.size() > kMostRuns) runs.pop_front();
+    if (runs.size() > kMostRuns) runs.erase(surplus_run(runs));
   }
   complete = true;
   changed.notify_all();

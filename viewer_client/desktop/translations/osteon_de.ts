@@ -207,8 +207,12 @@
         <translation>Speichert das gezeigte Bild als PNG-Datei</translation>
     </message>
     <message>
-        <source>%1: made again from the bone and the tools as they are now.</source>
-        <translation>%1: neu berechnet aus Knochen und Werkzeugen, wie sie jetzt sind.</translation>
+        <source>%1: made again from the bone and the tools as they were at %2.</source>
+        <translation>%1: neu berechnet aus Knochen und Werkzeugen, wie sie um %2 waren.</translation>
+    </message>
+    <message>
+        <source>The room has no picture of this person any more.</source>
+        <translation>Der Raum hat kein Bild dieser Person mehr.</translation>
     </message>
     <message>
         <source>You are an observer: the others do not see your shots.</source>
@@ -1899,8 +1903,8 @@
         <translation>Von einer Person erscheint das neueste Bild, von einer Zeile darunter dieser Druck.</translation>
     </message>
     <message>
-        <source>The picture is made again from the bone and the tools as they are now.</source>
-        <translation>Das Bild wird neu berechnet aus Knochen und Werkzeugen, wie sie jetzt sind.</translation>
+        <source>The picture is made again from the bone and the tools as they are when you choose it.</source>
+        <translation>Das Bild wird aus Knochen und Werkzeugen neu berechnet, wie sie bei der Auswahl sind.</translation>
     </message>
     <message>
         <source>Pictures of</source>

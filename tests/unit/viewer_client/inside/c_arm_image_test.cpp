@@ -135,7 +135,7 @@ TEST_F(CArmPictures, AShotFromANewPlaceIsCoarseFirst) {
   EXPECT_NE(next[0]->grey, both[1]->grey);
 }
 
-// Of a record alone, on another computer: the same bytes, whichever picture had set the kerma.
+// Of a record alone, by another C-arm: the same bytes, whichever picture had set the kerma.
 TEST_F(CArmPictures, AShotIsMadeAgainFromItsRecord) {
   const auto seen = fresh(order_at(3, axial())), seen_next = second(order_at(4, axial()));
   Arm other;

@@ -84,6 +84,45 @@ TEST_F(SharedShotsTest, EachPressIsToldInTurnWhileTheRoomIsSlow) {
   EXPECT_EQ(single->run.shots(), 1u);
 }
 
+TEST_F(SharedShotsTest, WhatTheRoomWasNotThereForIsToldLater) {
+  const auto lose = [&] {
+    const auto message = shared_.due(now_ += 250ms);
+    ASSERT_TRUE(message);
+    shared_.answered();
+    shared_.put_back(message->run);
+  };
+  shoot(true);
+  lose();
+  EXPECT_FALSE(shared_.idle());
+  EXPECT_FALSE(shared_.due(now_ + 249ms));
+  // The press goes on.
+  shoot(false);
+  lose();
+  // The next press does not take its place.
+  shoot(true);
+  lose();
+  const auto first = shared_.due(now_ += 250ms);
+  ASSERT_TRUE(first);
+  EXPECT_EQ(first->run.first_number, 1u);
+  EXPECT_EQ(first->run.last.number, 2u);
+  EXPECT_EQ(first->run.exposure_s, 0.5);
+  EXPECT_EQ(first->session.shots, 3u);
+  shared_.answered();
+  // While the next message is on its way, there is a newer state of its press.
+  const auto second = shared_.due(now_ += 250ms);
+  ASSERT_TRUE(second);
+  EXPECT_EQ(second->run.first_number, 3u);
+  shoot(false);
+  shared_.answered();
+  shared_.put_back(second->run);
+  const auto newer = shared_.due(now_ += 250ms);
+  ASSERT_TRUE(newer);
+  EXPECT_EQ(newer->run.first_number, 3u);
+  EXPECT_EQ(newer->run.last.number, 4u);
+  shared_.answered();
+  EXPECT_TRUE(shared_.idle()) << "once is enough";
+}
+
 TEST_F(SharedShotsTest, WhatWaitsIsBoundedAndEndsWithTheRoom) {
   for (std::size_t i = 0; i < 10 * SharedShots::kMostWaiting; ++i) shoot(true);
   std::size_t told = 0;
