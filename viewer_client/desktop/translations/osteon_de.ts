@@ -984,7 +984,7 @@
     </message>
     <message>
         <source>Left: the tool. Enter, or double click with Crosshair: keep. Right drag: window. Wheel: slices.</source>
-        <translation>Links: Werkzeug. Eingabe, Doppelklick mit Fadenkreuz: behalten. Rechts: Fenster. Rad: Schichten.</translation>
+        <translation>Links: Werkzeug. Fadenkreuz doppelt, Eingabe: behalten. Rechts: Fenster. Rad: Schicht</translation>
     </message>
 </context>
 <context>
