@@ -5,6 +5,7 @@
 #include <QTimer>
 #include <QWidget>
 #include <array>
+#include <bitset>
 #include <filesystem>
 #include <functional>
 #include <optional>
