@@ -6,6 +6,7 @@
 
 #include "common/core/check.hpp"
 #include "common/core/digest.hpp"
+#include "common/geometry/segment.hpp"
 
 namespace osteon::import {
 namespace {
@@ -16,20 +17,15 @@ std::string number_text(double value) {
   std::array<char, 32> text{};
   return {text.data(), std::to_chars(text.data(), text.data() + text.size(), value, std::chars_format::general, 7).ptr};
 }
+// Four decimals, so that small numbers are short too. That of -0 is 0.
 std::string point_text(const Vec3& at) {
-  return number_text(at.x()) + "," + number_text(at.y()) + "," + number_text(at.z());
+  const auto rounded = [](double value) { return number_text(std::round(1e4 * value) / 1e4 + 0.0); };
+  return rounded(at.x()) + "," + rounded(at.y()) + "," + rounded(at.z());
 }
 
 // The error of the edit with this index.
 tl::unexpected<Error> bad_edit(std::size_t index, const LabelEdit& edit, const std::string& what) {
   return bad_input("edit " + std::to_string(index + 1) + " (" + std::string(name_of(edit.kind)) + "): " + what);
-}
-
-double to_segment_mm(const Vec3& at, const Vec3& from, const Vec3& to) {
-  const Vec3 along = to - from;
-  const double length2 = along.squaredNorm();
-  const double t = length2 > 0.0 ? std::clamp((at - from).dot(along) / length2, 0.0, 1.0) : 0.0;
-  return (at - from - t * along).norm();
 }
 
 // Half the extent of a voxel along a direction.
@@ -96,7 +92,7 @@ class Replay {
                 : voxels_around(grid_, from, to, edit.radius_mm);
       const auto in = [&](const Vec3& at) {
         if (flat && std::abs(edit.normal.dot(at - edit.points_mm.front())) >= half_mm - 1e-9) return false;
-        return whole ? edit.normal.dot(at - from) >= -1e-9 : to_segment_mm(at, from, to) <= edit.radius_mm + 1e-9;
+        return whole ? edit.normal.dot(at - from) >= -1e-9 : segment_distance_mm(at, from, to) <= edit.radius_mm + 1e-9;
       };
       for (int slice = box.first[2]; slice <= box.last[2] && going; ++slice) {
         going = keep_going_(0.0);
@@ -215,8 +211,9 @@ Result<std::vector<EditEffect>> apply_edits(const imaging::HuVolume& grid, std::
     const std::int64_t covered = replay.play(edit, effects[index]);
     if (covered < 0) return stopped_while("replaying the edits");
     if (covered == 0 && edit.kind != EditKind::cut)
-      return bad_edit(index, edit,
-                      "it covers no voxel of the scan; write a position within the scan, or a larger radius_mm");
+      return bad_edit(
+          index, edit,
+          "it covers no voxel of the scan and its box; write a position within both, or a larger radius_mm");
   }
   return effects;
 }

@@ -100,7 +100,7 @@ TEST_F(ImagingEditsTest, ACutAndNamedBoneIsThatOfTheSameList) {
   click("tool_cut");
   // Down the screen: what is to its right is the left of the screen.
   const auto [x, y, z] = ball(1);
-  drag(axial, {x, y - 14, z}, {x, y + 14, z});
+  drag(axial, {x, y - 8, z}, {x, y + 14, z});
   const QColor gone = colour(axial, {x - 4, y - 3, z}), there = colour(axial, {x + 4, y - 3, z});
   // Red, and the colour of an island.
   EXPECT_GT(gone.red(), gone.green() + 50);
@@ -170,6 +170,65 @@ TEST_F(ImagingEditsTest, AFilterShowsInThePlanesAndIsUndone) {
   EXPECT_FALSE(can_undo());
   click("redo_edit");
   EXPECT_TRUE(until([&] { return found(2) && filter.currentIndex() == 3; })) << words();
+  // Another scan begins without a filter.
+  window_->process_images(QString::fromStdString(folder().string()));
+  auto& list = part<QListWidget>("series");
+  EXPECT_TRUE(until([&] { return list.isVisible() && list.count() == 1; })) << words();
+  EXPECT_EQ(filter.currentIndex(), 0);
+}
+
+// The filter succeeds, and the search for the parts does not: its file cannot be written.
+TEST_F(ImagingEditsTest, UndoShowsThePlainScanAfterASearchThatFailed) {
+  ImagingPlane& axial = plane("plane_axial");
+  const auto [x, y, z] = ball(1);
+  const QPoint beside = axial.pixel({x + 10, y, z});
+  QTest::mouseClick(&axial, Qt::LeftButton, {}, beside);
+  EXPECT_TRUE(label("readout").startsWith("40 HU")) << label("readout").toStdString();
+  click("tool_paint");
+  part<QDoubleSpinBox>("gaussian").setValue(2.0);
+  EXPECT_FALSE(can_undo());
+  const fs::path islands =
+      cases_folder() / (".partial-imaging-" + std::to_string(QCoreApplication::applicationPid())) / "islands.nrrd";
+  fs::remove(islands);
+  fs::create_directories(islands / "taken");
+  auto& filter = part<QComboBox>("filter");
+  filter.setCurrentIndex(3);
+  emit filter.activated(3);
+  ASSERT_TRUE(until([&] { return part<QPushButton>("find_parts").isVisible(); })) << words();
+  EXPECT_FALSE(label("readout").startsWith("40 HU")) << label("readout").toStdString();
+  // The left button still moves the crosshair, and the page says why it does not paint.
+  const int before = plane("plane_coronal").slice();
+  QTest::mouseClick(&axial, Qt::LeftButton, {}, axial.pixel({x, y - 16, z}));
+  EXPECT_NE(plane("plane_coronal").slice(), before);
+  EXPECT_NE(words().find("Find the parts"), std::string::npos) << words();
+  EXPECT_FALSE(part<QToolButton>("tool_paint").isEnabled());
+  EXPECT_TRUE(part<QToolButton>("tool_box").isEnabled());
+  click("tool_look");
+  QTest::mouseClick(&axial, Qt::LeftButton, {}, beside);
+  fs::remove_all(islands);
+  click("undo_edit");
+  EXPECT_TRUE(until([&] { return found(2) && label("readout").startsWith("40 HU"); })) << words();
+}
+
+TEST_F(ImagingEditsTest, ACutWhereSeveralBonesGrowAsksForTheBone) {
+  ImagingPlane& axial = plane("plane_axial");
+  const auto [x, y, z] = ball(1);
+  double_click(axial, axial.pixel({x - 5, y, z}));
+  double_click(axial, axial.pixel({x + 5, y, z}));
+  auto& choice = part<QComboBox>("bone_choice");
+  ASSERT_EQ(choice.count(), 3);
+  click("tool_cut");
+  const std::array<int, 3> to_the_right{x - 4, y - 3, z};
+  const auto is_cut = [&] {
+    const QColor seen = colour(axial, to_the_right);
+    return seen.red() > seen.green() + 50 && std::abs(seen.green() - seen.blue()) <= 3;
+  };
+  drag(axial, {x, y - 8, z}, {x, y + 14, z});
+  EXPECT_NE(words().find("Choose the bone"), std::string::npos) << words();
+  EXPECT_FALSE(is_cut());
+  choice.setCurrentIndex(2);
+  drag(axial, {x, y - 8, z}, {x, y + 14, z});
+  EXPECT_TRUE(is_cut()) << words();
 }
 
 TEST_F(ImagingEditsTest, ABoxOnTwoPlanesLimitsTheSearchAndAClickTakesItAway) {
@@ -200,6 +259,10 @@ TEST_F(ImagingEditsTest, TheKeyboardPaintsAndEscapeTakesAStrokeBack) {
   QApplication::sendEvent(&axial, &wheel);
   EXPECT_EQ(radius.value(), 4.0);
   EXPECT_EQ(axial.slice(), 12) << "with Ctrl the wheel stays in the slice";
+  click("tool_look");
+  QApplication::sendEvent(&axial, &wheel);
+  EXPECT_EQ(radius.value(), 4.0) << "no brush";
+  click("tool_paint");
   // 2 voxels of 0.9 mm from the middle: within the brush.
   const std::array<int, 3> beside{27, 18, 12};
   const auto tinted = [&] {
@@ -210,6 +273,10 @@ TEST_F(ImagingEditsTest, TheKeyboardPaintsAndEscapeTakesAStrokeBack) {
   axial.setFocus();
   QTest::keyClick(&axial, Qt::Key_Space);
   EXPECT_TRUE(tinted()) << "at once";
+  QApplication::sendEvent(&axial, &wheel);
+  EXPECT_EQ(radius.value(), 5.0);
+  EXPECT_TRUE(tinted()) << "a larger brush takes no stroke back";
+  radius.setValue(4.0);
   QTest::keyClick(&axial, Qt::Key_Escape);
   EXPECT_FALSE(tinted());
   EXPECT_FALSE(can_undo());
@@ -233,6 +300,18 @@ TEST_F(ImagingEditsTest, TheKeyboardPaintsAndEscapeTakesAStrokeBack) {
   EXPECT_TRUE(tinted());
   part<QSlider>("slice_axial").setValue(13);
   EXPECT_FALSE(tinted());
+}
+
+TEST_F(ImagingEditsTest, AStrokeOfTheKeyboardEndsWhenItsPlaneLosesTheFocus) {
+  ImagingPlane& axial = plane("plane_axial");
+  click("tool_paint");
+  axial.setFocus();
+  QTest::keyClick(&axial, Qt::Key_Space);
+  QTest::keyClick(&axial, Qt::Key_Down);
+  EXPECT_FALSE(can_undo());
+  QFocusEvent leaves(QEvent::FocusOut, Qt::TabFocusReason);
+  QApplication::sendEvent(&axial, &leaves);
+  EXPECT_TRUE(can_undo());
 }
 
 TEST_F(ImagingEditsTest, ACutThatBeginsBesideEveryBoneSaysSo) {

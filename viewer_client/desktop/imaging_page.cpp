@@ -152,7 +152,7 @@ QBoxLayout* ImagingPage::make_planes() {
          [this](const std::array<int, 3>& voxel) { point_at(voxel); },
          [this](const std::array<int, 3>& voxel) { keep_at(voxel); },
          [this](const HuWindow& window) { change_window(window); },
-         [this](const PlaneAxes& axes, const std::array<int, 3>& voxel) { begin_drag(axes, voxel); },
+         [this](const PlaneAxes& axes, const std::array<int, 3>& voxel) { return begin_drag(axes, voxel); },
          [this](const std::array<int, 3>& voxel) { drag_to(voxel); }, [this](bool keep) { end_drag(keep); },
          [this](int notches) { tools_->turn_radius(notches); }});
     grid->addWidget(planes_[i], static_cast<int>(i) / 2, static_cast<int>(i) % 2);
@@ -282,6 +282,7 @@ void ImagingPage::open_source(const QString& source) {
   history_ = {};
   found_.reset();
   shown_filter_ = {};
+  show_filter({});
   drag_.reset();
   scene_.look = {};
   scene_.seeds.clear();
@@ -374,7 +375,7 @@ void ImagingPage::show_islands(std::vector<ListedIsland> list, IslandMap map) {
   const bool first = !found_;
   found_ = searched_;
   if (first) show_largest_bone();
-  end_work(tr("Double-click a bone, or tick it in the list, and make it."));
+  end_work(tr("Tick a bone in the list, or double-click it with Crosshair, and make it."));
   // A threshold that the user sets just now stays, and its parts are found next.
   threshold_timer_.isActive() ? refresh_list() : follow_edits();
 }
@@ -446,18 +447,19 @@ void ImagingPage::enable_parts() {
   const bool free = !steps_.busy(), making = steps_.making();
   // Until the user has stopped to change the threshold, the parts are of another one than the page shows.
   const bool changing = threshold_timer_.isActive();
-  const bool found = free && !changing && scene_.open() && !islands_.empty() && wanted() == found_;
+  const bool found = free && !changing && scene_.open() && !islands_.empty() && current();
   const QString wait = tr("osteon-import is at work. Wait for it, or cancel it.");
-  const QString none = free ? tr("Choose a threshold that bone reaches.") : wait;
+  const QString none = free ? tr("Find the parts. If there are none, choose another threshold or box.") : wait;
   set_enabled(*back_, !making, wait);
   set_enabled(*threshold_, !making, wait);
   set_enabled(*filter_, !making, wait);
   const bool gaussian = filter_->currentIndex() == kGaussianRow;
   set_enabled(*gaussian_, !making && gaussian, making ? wait : tr("Choose the Gaussian first."));
-  set_enabled(*tools_, found, none);
+  set_enabled(*tools_, !making, wait);
+  tools_->set_found(found, none);
   set_enabled(*choice_, found, none);
   // After a search that was cancelled or failed.
-  find_->setVisible(free && !changing && scene_.open() && wanted() != found_);
+  find_->setVisible(free && !changing && scene_.open() && !current());
   set_enabled(*keep_, found, none);
   set_enabled(*island_list_, found, none);
   set_enabled(*undo_, !making && (changing || history_.can_undo()), making ? wait : tr("There is nothing to undo."));
@@ -466,7 +468,8 @@ void ImagingPage::enable_parts() {
     const auto voxel = scene_.open() ? voxel_of(scene_.scan.geometry, seed.at_mm) : std::nullopt;
     return voxel && seed.bone != 0 && scene_.islands.number(*voxel) != 0;
   });
-  set_enabled(*make_, found && some, found ? tr("Keep a bone first: double-click it, or tick it in the list.") : none);
+  set_enabled(*make_, found && some,
+              found ? tr("Keep a bone first: tick it in the list, or double-click it with Crosshair.") : none);
 }
 
 }  // namespace osteon

@@ -5,6 +5,7 @@
 #include <QTimer>
 #include <QWidget>
 #include <array>
+#include <bitset>
 #include <filesystem>
 #include <functional>
 #include <optional>
@@ -86,7 +87,9 @@ class ImagingPage : public QWidget {
   void take_filter();
   void show_filter(const ScanFilter& filter);
   void follow_tools();
-  void begin_drag(const PlaneAxes& axes, const std::array<int, 3>& voxel);
+  // Moves the crosshair at least, and says why no drag begins.
+  bool begin_drag(const PlaneAxes& axes, const std::array<int, 3>& voxel);
+  void end_drags(bool keep);
   void drag_to(const std::array<int, 3>& voxel);
   void end_drag(bool keep);
   void show_drag();
@@ -95,7 +98,9 @@ class ImagingPage : public QWidget {
   void fade_bone(int bone, int percent);
   // Into the history, with the time since the last edit for a bone; 0: for none.
   void take(ImagingEdits edits, int bone);
-  // The lowest bone that grows in the island of a voxel; 0: none.
+  // The bones at a voxel: that of its paint, or all that grow in its island.
+  [[nodiscard]] std::bitset<256> bones_under(const std::array<int, 3>& voxel) const;
+  // The lowest of them; 0: none.
   [[nodiscard]] int bone_at(const std::array<int, 3>& voxel) const;
   [[nodiscard]] bool kept(int island) const;
   // The history has another state now.
@@ -120,6 +125,8 @@ class ImagingPage : public QWidget {
   [[nodiscard]] IslandSearch wanted() const {
     return {history_.now().threshold_hu, history_.now().filter, history_.now().box};
   }
+  // Whether the planes and the parts are those of the edits.
+  [[nodiscard]] bool current() const { return wanted() == found_ && wanted().filter == shown_filter_; }
   [[nodiscard]] double found_hu() const { return found_ ? found_->threshold_hu : 0.0; }
   std::optional<IslandSearch> found_;  // nothing: none were found yet
   IslandSearch searched_;              // of the islands that are being found

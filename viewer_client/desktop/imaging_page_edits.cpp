@@ -58,22 +58,26 @@ void ImagingPage::show_filter(const ScanFilter& filter) {
 
 void ImagingPage::take(ImagingEdits edits, int bone) {
   if (edits == history_.now()) return refresh_list();
+  if (bone != 0) {
+    const double minutes = static_cast<double>(work_.elapsed()) / kMsPerMinute;
+    own_label(edits, bone).minutes += std::min(kLongestPause_min, minutes);
+  }
   if (!is_listable(edits)) {
     words_->setText(tr("The edit list is full, at 1000 edits or 1 MiB. Make the bone, or undo edits."));
     refresh_list();
     return refresh_planes();
-  }
-  if (bone != 0) {
-    const double minutes = static_cast<double>(work_.elapsed()) / kMsPerMinute;
-    own_label(edits, bone).minutes += std::min(kLongestPause_min, minutes);
   }
   work_.restart();
   history_.apply(std::move(edits));
   follow_edits();
 }
 
+std::bitset<256> ImagingPage::bones_under(const std::array<int, 3>& voxel) const {
+  return bones_at(scene_.scan.geometry, scene_.islands, scene_.look.kept, voxel, history_.now().corrections);
+}
+
 int ImagingPage::bone_at(const std::array<int, 3>& voxel) const {
-  const std::bitset<256>& bones = scene_.look.kept[scene_.islands.number(voxel)];
+  const std::bitset<256> bones = bones_under(voxel);
   for (std::size_t bone = 1; bone < bones.size(); ++bone)
     if (bones.test(bone)) return static_cast<int>(bone);
   return 0;
@@ -139,18 +143,33 @@ void ImagingPage::change_island(const QListWidgetItem* item) {
 
 void ImagingPage::follow_tools() {
   if (tools_ == nullptr) return;  // it is being made
-  for (ImagingPlane* plane : planes_)
-    if (plane != nullptr) plane->stop_drag();
+  if (scene_.tool != tools_->tool()) end_drags(false);
   scene_.tool = tools_->tool();
   scene_.brush_mm = tools_->radius_mm();
-  refresh_planes();
+  drag_ ? show_drag() : refresh_planes();
 }
 
-void ImagingPage::begin_drag(const PlaneAxes& axes, const std::array<int, 3>& voxel) {
-  if (!keep_->isEnabled()) return;
-  drag_.emplace(scene_.tool, axes, voxel);
+bool ImagingPage::begin_drag(const PlaneAxes& axes, const std::array<int, 3>& voxel) {
+  end_drags(true);
   look_at(voxel);
+  // A box without bone can be drawn anew.
+  if (scene_.tool == ImagingTool::box ? steps_.making() : !keep_->isEnabled()) {
+    words_->setText(keep_->toolTip());
+    return false;
+  }
+  const bool of_one = scene_.tool == ImagingTool::paint || scene_.tool == ImagingTool::cut;
+  if (of_one && choice_->bone() == 0 && bones_under(voxel).count() > 1) {
+    words_->setText(tr("Several bones grow in this part. Choose the bone first."));
+    return false;
+  }
+  drag_.emplace(scene_.tool, axes, voxel);
   show_drag();
+  return true;
+}
+
+void ImagingPage::end_drags(bool keep) {
+  for (ImagingPlane* plane : planes_)
+    if (plane != nullptr) plane->end_drag(keep);
 }
 
 void ImagingPage::drag_to(const std::array<int, 3>& voxel) {
@@ -234,7 +253,7 @@ void ImagingPage::name_bone(int bone, const QString& name) {
   ImagingEdits edits = history_.now();
   const std::string text = name.trimmed().toStdString();
   if (!may_be_called(edits, bone, text)) {
-    words_->setText(tr("No bone can be called that. Write a short name that no other bone has."));
+    words_->setText(tr("No bone can be called that. Write up to 60 bytes that no other bone has."));
     return choice_->follow(edits);
   }
   own_label(edits, bone).name = text;
@@ -256,7 +275,7 @@ void ImagingPage::follow_edits() {
   threshold_timer_.stop();
   show_filter(edits.filter);
   choice_->follow(edits);
-  if (wanted() != found_) {
+  if (!current()) {
     scene_.look.threshold_hu = edits.threshold_hu;
     refresh_look();
     find_islands();
@@ -301,12 +320,19 @@ void ImagingPage::refresh_look() {
 }
 
 void ImagingPage::make_bone() {
-  show_work(tr("The bone is being made"));
+  end_drags(true);
+  if (!make_->isEnabled()) return;  // a box has begun a search
   const ImagingEdits& edits = history_.now();
   std::vector<KeptSeed> seeds;
   for (const KeptSeed& seed : edits.seeds)
-    for (const Vec3& at_mm : scene_.islands.moved_seeds(scene_.scan, found_hu(), {&seed.at_mm, 1}))
-      if (std::ranges::find(seeds, at_mm, &KeptSeed::at_mm) == seeds.end()) seeds.push_back({at_mm, seed.bone});
+    for (const Vec3& at_mm : scene_.islands.moved_seeds(scene_.scan, found_hu(), {&seed.at_mm, 1})) {
+      const auto same = std::ranges::find(seeds, at_mm, &KeptSeed::at_mm);
+      if (same == seeds.end())
+        seeds.push_back({at_mm, seed.bone});
+      else if (same->bone != seed.bone)
+        return words_->setText(tr("Seeds of two bones are in one voxel now. Choose a lower threshold, or undo one."));
+    }
+  show_work(tr("The bone is being made"));
   steps_.make(made_edits(edits, std::move(seeds), scene_.scan.geometry));
   events_.busy(steps_.making());
   enable_parts();

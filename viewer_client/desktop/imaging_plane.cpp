@@ -45,7 +45,7 @@ ImagingPlane::ImagingPlane(Plane plane, const ImagingScene& scene, Events events
   setAccessibleName(title_of(plane));
   setFocusPolicy(Qt::StrongFocus);
   setMouseTracking(true);
-  setToolTip(tr("Left: the tool. Double click, Enter: keep. Right drag: window. Wheel: slices."));
+  setToolTip(tr("Left: the tool. Enter, or double click with Crosshair: keep. Right drag: window. Wheel: slices."));
   slider_ = new QSlider(Qt::Vertical);
   slider_->setObjectName(QString("slice_") + name_of(plane));
   slider_->setAccessibleName(tr("%1: slice").arg(title_of(plane)));
@@ -146,17 +146,12 @@ void ImagingPlane::paint_marks(QPainter& painter, const PlaneFrame& at) const {
   painter.drawEllipse(QPointF(*hovered_), radius_px, radius_px);
 }
 
-void ImagingPlane::begin_drag(const std::array<int, 3>& voxel) {
-  dragging_ = true;
-  events_.begin_drag(axes_, voxel);
-}
+void ImagingPlane::begin_drag(const std::array<int, 3>& voxel) { dragging_ = events_.begin_drag(axes_, voxel); }
 
 void ImagingPlane::end_drag(bool keep) {
   if (!std::exchange(dragging_, false)) return;
   events_.end_drag(keep);
 }
-
-void ImagingPlane::stop_drag() { end_drag(false); }
 
 void ImagingPlane::mousePressEvent(QMouseEvent* event) {
   dragged_from_ = event->pos();
@@ -179,9 +174,7 @@ void ImagingPlane::mouseMoveEvent(QMouseEvent* event) {
   hovered_ = event->pos();
   if (has_brush()) update();
   if ((event->buttons() & Qt::LeftButton) != 0) {
-    if (scene_.tool == ImagingTool::look) return events_.look_at(voxel_under(event->pos()));
-    if (dragging_) events_.drag(voxel_under(event->pos()));
-    return;
+    return dragging_ ? events_.drag(voxel_under(event->pos())) : events_.look_at(voxel_under(event->pos()));
   }
   if ((event->buttons() & Qt::RightButton) != 0) {
     const QPoint way = event->pos() - dragged_from_;
@@ -203,8 +196,8 @@ void ImagingPlane::wheelEvent(QWheelEvent* event) {
   turned_ %= kWheelStep;
   event->accept();
   if (!scene_.open() || notches == 0) return;
-  if ((event->modifiers() & Qt::ControlModifier) != 0) return events_.change_brush(notches);
-  move_by(0, 0, notches);
+  if ((event->modifiers() & Qt::ControlModifier) == 0) return move_by(0, 0, notches);
+  if (has_brush()) events_.change_brush(notches);
 }
 
 void ImagingPlane::keyPressEvent(QKeyEvent* event) {
@@ -233,6 +226,11 @@ void ImagingPlane::keyPressEvent(QKeyEvent* event) {
     default:
       return QWidget::keyPressEvent(event);
   }
+}
+
+void ImagingPlane::focusOutEvent(QFocusEvent* event) {
+  end_drag(true);
+  QWidget::focusOutEvent(event);
 }
 
 void ImagingPlane::move_by(int right, int down, int through) {

@@ -35,8 +35,8 @@ struct ImagingScene {
 
 // [GUI thread] The left button moves the crosshair, a double click keeps the bone there, the right button drags the
 // window, and the wheel goes through the slices. Arrow keys, page keys and Enter do the same. With another tool the
-// left button drags the tool. On the keyboard, a blank begins and ends that drag at the crosshair, and Escape takes it
-// back.
+// left button drags the tool. On the keyboard, the space bar begins and ends that drag at the crosshair, and Escape
+// takes it back. A drag also ends when the plane loses the focus.
 class ImagingPlane : public QWidget {
   Q_DECLARE_TR_FUNCTIONS(ImagingPlane)
 
@@ -44,7 +44,7 @@ class ImagingPlane : public QWidget {
   struct Events {
     std::function<void(const std::array<int, 3>&voxel)> look_at, point_at, keep;
     std::function<void(const HuWindow& window)> change_window;
-    std::function<void(const PlaneAxes& axes, const std::array<int, 3>& voxel)> begin_drag;
+    std::function<bool(const PlaneAxes& axes, const std::array<int, 3>& voxel)> begin_drag;  // whether one begins
     std::function<void(const std::array<int, 3>& voxel)> drag;
     std::function<void(bool keep)> end_drag;
     std::function<void(int notches)> change_brush;
@@ -56,8 +56,8 @@ class ImagingPlane : public QWidget {
   void begin();
   // The scene has changed.
   void refresh();
-  // Takes a drag back.
-  void stop_drag();
+  // Of a tool, if there is one. Or takes it back.
+  void end_drag(bool keep);
   // Middle of a voxel, in pixels of the widget.
   [[nodiscard]] QPoint pixel(const std::array<int, 3>& voxel) const;
   [[nodiscard]] int slice() const;
@@ -73,6 +73,7 @@ class ImagingPlane : public QWidget {
   void leaveEvent(QEvent* event) override;
   void wheelEvent(QWheelEvent* event) override;
   void keyPressEvent(QKeyEvent* event) override;
+  void focusOutEvent(QFocusEvent* event) override;
 
  private:
   [[nodiscard]] PlaneFrame frame() const;
@@ -81,7 +82,6 @@ class ImagingPlane : public QWidget {
   void move_by(int right, int down, int through);
   void go_to_slice(int slice);
   void begin_drag(const std::array<int, 3>& voxel);
-  void end_drag(bool keep);
   [[nodiscard]] bool has_brush() const {
     return scene_.tool == ImagingTool::paint || scene_.tool == ImagingTool::erase;
   }

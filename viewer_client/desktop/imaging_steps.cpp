@@ -140,8 +140,10 @@ void ImagingSteps::in_background(std::function<void()> work, std::function<void(
   loader_.reset(QThread::create(std::move(work)));
   connect(loader_.get(), &QThread::finished, this, [this, then = std::move(then)] {
     loader_.release()->deleteLater();
-    if (cancelled_) return fail({});
-    then();
+    if (!cancelled_) return then();
+    scan_ = ShownScan();
+    islands_ = IslandMap();
+    fail({});
   });
   loader_->start();
 }

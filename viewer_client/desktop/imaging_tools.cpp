@@ -65,7 +65,7 @@ ImagingTools::ImagingTools(std::function<void()> changed, QWidget* parent)
   flat_ = new QCheckBox(tr("One slice"));
   flat_->setObjectName("brush_flat");
   flat_->setToolTip(tr("The brush is a disc in the slice that you see, instead of a ball"));
-  flat_->setShortcut(QKeySequence("Ctrl+Alt+D"));
+  flat_->setShortcut(QKeySequence("Ctrl+Alt+O"));
   row->addWidget(flat_);
   row->addStretch();
   choose(ImagingTool::look);
@@ -101,6 +101,14 @@ bool ImagingTools::flat() const { return flat_->isChecked(); }
 
 void ImagingTools::turn_radius(int notches) { radius_->setValue(radius_->value() + notches * kBrushStep_mm); }
 
+void ImagingTools::set_found(bool found, const QString& reason) {
+  for (QToolButton* button : buttons_) {
+    const int tool = button->property("tool").toInt();
+    const bool always = tool == static_cast<int>(ImagingTool::look) || tool == static_cast<int>(ImagingTool::box);
+    set_enabled(*button, found || always, reason);
+  }
+}
+
 void ImagingTools::reset() { choose(ImagingTool::look); }
 
 ImagingBoneChoice::ImagingBoneChoice(Events events, QWidget* parent) : QWidget(parent), events_(std::move(events)) {
@@ -109,7 +117,7 @@ ImagingBoneChoice::ImagingBoneChoice(Events events, QWidget* parent) : QWidget(p
   bone_ = new QComboBox;
   bone_->setObjectName("bone_choice");
   bone_->setAccessibleName(tr("Bone of the tools"));
-  bone_->setToolTip(tr("The bone of the next seed, brush or cut. Seeds of one bone merge their parts."));
+  bone_->setToolTip(tr("The bone of the next seed, paint or cut. Seeds of one bone merge their parts."));
   connect(bone_, QOverload<int>::of(&QComboBox::currentIndexChanged), this, [this] { show_bone(); });
   form->addRow(tr("Bone"), bone_);
   auto* row = new QHBoxLayout;

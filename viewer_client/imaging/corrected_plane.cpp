@@ -4,6 +4,8 @@
 #include <cmath>
 #include <utility>
 
+#include "common/geometry/segment.hpp"
+
 namespace osteon {
 
 namespace {
@@ -12,13 +14,6 @@ constexpr double kSameLength_mm = 1e-9;  // as in osteon-import
 
 Vec3 voxels_of(const ScanGeometry& scan, const Vec3& at_mm) {
   return scan.axes_mm.inverse() * (at_mm - scan.origin_mm);
-}
-
-double segment_distance_mm(const Vec3& at, const Vec3& from, const Vec3& to) {
-  const Vec3 along = to - from;
-  const double length2 = along.squaredNorm();
-  const double t = length2 > 0.0 ? std::clamp((at - from).dot(along) / length2, 0.0, 1.0) : 0.0;
-  return (at - from - t * along).norm();
 }
 
 // The voxels of a range that a stroke may reach between two of its points.
@@ -74,9 +69,7 @@ class Marks {
 
   void play(const ScanGeometry& scan, const VoxelRange& plane, const Correction& correction) {
     const auto change = [&](const std::array<int, 3>& voxel) {
-      const auto [column, row, slice] = place_in(axes_, voxel);
-      std::uint8_t& mark = of_pixel_[static_cast<std::size_t>(row) * static_cast<std::size_t>(axes_.columns) +
-                                     static_cast<std::size_t>(column)];
+      std::uint8_t& mark = at(voxel);
       if (correction.kind == CorrectionKind::paint)
         mark = static_cast<std::uint8_t>(correction.bone);
       else if (is_bone(mark, voxel, correction))
@@ -89,6 +82,12 @@ class Marks {
         for (int x = plane.first[0]; x <= plane.last[0]; ++x)
           if (correction.normal.dot(scan.position_mm(Vec3(x, y, z)) - correction.points_mm.front()) >= -kSameLength_mm)
             change({x, y, z});
+  }
+  // The mark of a voxel of the plane.
+  [[nodiscard]] std::uint8_t& at(const std::array<int, 3>& voxel) {
+    const auto [column, row, slice] = place_in(axes_, voxel);
+    return of_pixel_[static_cast<std::size_t>(row) * static_cast<std::size_t>(axes_.columns) +
+                     static_cast<std::size_t>(column)];
   }
   [[nodiscard]] std::vector<std::uint8_t> take() { return std::move(of_pixel_); }
 
@@ -139,6 +138,16 @@ std::vector<std::uint8_t> corrected_plane(const ScanGeometry& scan, const Island
   const VoxelRange plane = plane_range(scan, axes, slice);
   for (const SharedCorrection& correction : corrections) marks.play(scan, plane, *correction);
   return marks.take();
+}
+
+std::bitset<256> bones_at(const ScanGeometry& scan, const IslandMap& islands, const BonesOfIslands& bones,
+                          const std::array<int, 3>& voxel, std::span<const SharedCorrection> corrections) {
+  const PlaneAxes axes = axes_of(scan, Plane::axial);
+  Marks marks(islands, bones, axes);
+  for (const SharedCorrection& correction : corrections) marks.play(scan, {voxel, voxel}, *correction);
+  const std::uint8_t mark = marks.at(voxel);
+  if (mark == 0) return bones[islands.number(voxel)];
+  return mark == kErased ? std::bitset<256>() : std::bitset<256>().set(mark);
 }
 
 }  // namespace osteon

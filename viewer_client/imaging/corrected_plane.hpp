@@ -33,11 +33,14 @@ struct VoxelRange {
 using BonesOfIslands = std::array<std::bitset<256>, 256>;
 
 // Of each pixel of a plane, rows from the top: 0, or the number of the bone that is painted there, or kErased. Empty:
-// no correction reaches the plane. Corrections come in their order, as osteon-import replays them. Where one island has
-// several bones, nobody knows yet where the importer parts them: a cut of one shows on the whole island.
+// there are no corrections. They come in their order, as osteon-import replays them. Where one island has several
+// bones, nobody knows yet where the importer parts them: a cut of one shows on the whole island.
 inline constexpr std::uint8_t kErased = 255;
 [[nodiscard]] std::vector<std::uint8_t> corrected_plane(const ScanGeometry& scan, const IslandMap& islands,
                                                         const BonesOfIslands& bones, const PlaneAxes& axes, int slice,
                                                         std::span<const SharedCorrection> corrections);
+// The same of a voxel: the bone that is painted there, or all that grow in its island if no correction reaches it.
+[[nodiscard]] std::bitset<256> bones_at(const ScanGeometry& scan, const IslandMap& islands, const BonesOfIslands& bones,
+                                        const std::array<int, 3>& voxel, std::span<const SharedCorrection> corrections);
 
 }  // namespace osteon

@@ -5,6 +5,7 @@
 #include <bitset>
 #include <charconv>
 #include <cmath>
+#include <span>
 #include <utility>
 
 #include "common/core/bounded_text.hpp"
@@ -40,7 +41,20 @@ std::string entry(const std::string& kind, const std::string& fields) {
   return "  - {kind: " + kind + ", " + fields + "}\n";
 }
 
-// Edits of a stroke from its point `first` on, as many points as one may have. The next ones begin where it ends.
+// A stroke as edits with as many points as one may have. The next one begins where it ends.
+std::vector<SharedCorrection> parts_of(const SharedCorrection& stroke) {
+  if (stroke->points_mm.size() <= kMostStrokePoints) return {stroke};
+  std::vector<SharedCorrection> parts;
+  const std::span<const Vec3> points = stroke->points_mm;
+  for (std::size_t first = 0; first + 1 < points.size(); first += kMostStrokePoints - 1) {
+    const auto some = points.subspan(first, std::min(kMostStrokePoints, points.size() - first));
+    parts.push_back(std::make_shared<const Correction>(
+        Correction{stroke->kind, stroke->bone, {some.begin(), some.end()}, stroke->radius_mm, stroke->normal}));
+  }
+  return parts;
+}
+
+// An edit of a part of a stroke.
 std::string stroke_text(const Correction& stroke) {
   const bool paints = stroke.kind == CorrectionKind::paint;
   const std::string bone = paints ? "bone: " + std::to_string(stroke.bone) + ", " : "";
@@ -48,14 +62,9 @@ std::string stroke_text(const Correction& stroke) {
   if (stroke.normal != Vec3::Zero()) rest += ", normal: " + triple(stroke.normal);
   const std::vector<Vec3>& points = stroke.points_mm;
   if (points.size() == 1) return entry(paints ? "paint" : "erase", bone + "centre_mm: " + triple(points[0]) + rest);
-  std::string text;
-  for (std::size_t first = 0; first + 1 < points.size(); first += kMostStrokePoints - 1) {
-    std::string list;
-    for (std::size_t i = first; i < std::min(points.size(), first + kMostStrokePoints); ++i)
-      list += (list.empty() ? "" : ", ") + triple(points[i]);
-    text += entry(paints ? "scribble" : "erase", bone + "points_mm: [" + list + "]" + rest);
-  }
-  return text;
+  std::string list;
+  for (const Vec3& point : points) list += (list.empty() ? "" : ", ") + triple(point);
+  return entry(paints ? "scribble" : "erase", bone + "points_mm: [" + list + "]" + rest);
 }
 
 std::string correction_text(const Correction& correction) {
@@ -117,7 +126,8 @@ std::string edit_list_text(const ImagingEdits& edits) {
     text +=
         entry("box", "corner_mm: " + triple(edits.box->corner_mm) + ", opposite_mm: " + triple(edits.box->opposite_mm));
   for (const KeptSeed& seed : edits.seeds) text += seed_text(seed);
-  for (const SharedCorrection& correction : edits.corrections) text += correction_text(*correction);
+  for (const SharedCorrection& correction : edits.corrections)
+    for (const SharedCorrection& part : parts_of(correction)) text += correction_text(*part);
   for (const BoneLabel& label : edits.labels) text += label_text(label);
   return text;
 }
@@ -143,10 +153,12 @@ ImagingEdits made_edits(const ImagingEdits& edits, std::vector<KeptSeed> seeds, 
   for (const KeptSeed& seed : made.seeds) there.set(static_cast<std::size_t>(seed.bone));
   const VoxelRange range = range_of(scan, edits.box);
   for (const SharedCorrection& correction : edits.corrections) {
-    const bool cuts = correction->kind == CorrectionKind::cut;
-    if (cuts ? !there.test(static_cast<std::size_t>(correction->bone)) : !reaches(scan, range, *correction)) continue;
-    if (correction->kind == CorrectionKind::paint) there.set(static_cast<std::size_t>(correction->bone));
-    made.corrections.push_back(correction);
+    const auto bone = static_cast<std::size_t>(correction->bone);
+    for (const SharedCorrection& part : parts_of(correction)) {
+      if (part->kind == CorrectionKind::cut ? !there.test(bone) : !reaches(scan, range, *part)) continue;
+      if (part->kind == CorrectionKind::paint) there.set(bone);
+      made.corrections.push_back(part);
+    }
   }
   return made;
 }

@@ -364,6 +364,14 @@ TEST(EditFile, EachEditIsALineForTheProvenance) {
     for (Vec3& point : edit.points_mm) point = Vec3::Constant(-1e5 / 3.0);
     EXPECT_LE(edit_text(edit).size(), 200u);
   }
+  for (const double tiny : {-0.0001234567, -1.234567e-300}) {
+    const LabelEdit small{.kind = EditKind::scribble,
+                          .bone = 254,
+                          .points_mm = std::vector<Vec3>(1000, {tiny, -12345.67, -123.456789}),
+                          .radius_mm = 0.05678912,
+                          .normal = {tiny, -0.00123456, -0.9999992}};
+    EXPECT_LE(edit_text(small).size(), 200u) << edit_text(small);
+  }
 }
 
 }  // namespace

@@ -622,8 +622,8 @@
         <translation>Knochen der Werkzeuge</translation>
     </message>
     <message>
-        <source>The bone of the next seed, brush or cut. Seeds of one bone merge their parts.</source>
-        <translation>Knochen der Werkzeuge. Saatpunkte eines Knochens vereinen ihre Teile.</translation>
+        <source>The bone of the next seed, paint or cut. Seeds of one bone merge their parts.</source>
+        <translation>Knochen für Saatpunkt, Pinsel, Schnitt. Saatpunkte eines Knochens vereinen Teile.</translation>
     </message>
     <message>
         <source>Bone</source>
@@ -844,8 +844,8 @@
         <translation>Die Teile aus Knochen werden gesucht</translation>
     </message>
     <message>
-        <source>Double-click a bone, or tick it in the list, and make it.</source>
-        <translation>Knochen doppelklicken oder in der Liste anhaken, dann erzeugen.</translation>
+        <source>Tick a bone in the list, or double-click it with Crosshair, and make it.</source>
+        <translation>Knochen anhaken, oder mit dem Fadenkreuz doppelklicken, dann erzeugen.</translation>
     </message>
     <message>
         <source>%1 HU at %2, %3, %4 mm</source>
@@ -864,8 +864,8 @@
         <translation>osteon-import arbeitet. Warten Sie darauf oder brechen Sie es ab.</translation>
     </message>
     <message>
-        <source>Choose a threshold that bone reaches.</source>
-        <translation>Wählen Sie einen Schwellwert, den Knochen erreicht.</translation>
+        <source>Find the parts. If there are none, choose another threshold or box.</source>
+        <translation>Suchen Sie die Teile. Gibt es keine, ändern Sie Schwellwert oder Quader.</translation>
     </message>
     <message>
         <source>There is nothing to undo.</source>
@@ -876,8 +876,8 @@
         <translation>Es gibt nichts zu wiederholen.</translation>
     </message>
     <message>
-        <source>Keep a bone first: double-click it, or tick it in the list.</source>
-        <translation>Behalten Sie erst einen Knochen: durch Doppelklick oder ein Häkchen in der Liste.</translation>
+        <source>Keep a bone first: tick it in the list, or double-click it with Crosshair.</source>
+        <translation>Behalten Sie erst einen Knochen: Häkchen in der Liste oder Doppelklick.</translation>
     </message>
     <message>
         <source>The bone is being made</source>
@@ -948,8 +948,16 @@
         <translation>Die Linie beginnt auf keinem Knochen. Wählen Sie einen.</translation>
     </message>
     <message>
-        <source>No bone can be called that. Write a short name that no other bone has.</source>
-        <translation>So kann kein Knochen heißen. Der Name ist kurz und gehört keinem anderen.</translation>
+        <source>Several bones grow in this part. Choose the bone first.</source>
+        <translation>In diesem Teil wachsen mehrere Knochen. Wählen Sie erst einen.</translation>
+    </message>
+    <message>
+        <source>Seeds of two bones are in one voxel now. Choose a lower threshold, or undo one.</source>
+        <translation>Zwei Knochen haben nun einen Saatpunkt. Senken Sie den Schwellwert.</translation>
+    </message>
+    <message>
+        <source>No bone can be called that. Write up to 60 bytes that no other bone has.</source>
+        <translation>So kann kein Knochen heißen. Der Name hat bis 60 Byte und gehört keinem anderen.</translation>
     </message>
     <message>
         <source>Smoothing</source>
@@ -979,8 +987,8 @@
         <translation>%1, %2 von %3</translation>
     </message>
     <message>
-        <source>Left: the tool. Double click, Enter: keep. Right drag: window. Wheel: slices.</source>
-        <translation>Links: Werkzeug. Doppelklick, Eingabe: behalten. Rechts: Fenster. Rad: Schichten.</translation>
+        <source>Left: the tool. Enter, or double click with Crosshair: keep. Right drag: window. Wheel: slices.</source>
+        <translation>Links: Werkzeug. Fadenkreuz doppelt, Eingabe: behalten. Rechts: Fenster. Rad: Schicht</translation>
     </message>
 </context>
 <context>

@@ -71,11 +71,22 @@ TEST(CorrectedPlane, EachVoxelIsAsTheImporterMakesIt) {
           const int mark = marks[static_cast<std::size_t>(row * axes.columns + column)];
           const int shown = mark == 0 ? before.at(i, j, k) : mark == kErased ? 0 : mark;
           ASSERT_EQ(shown, labels.at(i, j, k)) << i << " " << j << " " << k;
+          const auto under = bones_at(scan, islands, bones, {i, j, k}, edits.corrections);
+          ASSERT_EQ(under.count(), shown == 0 ? 0u : 1u);
+          ASSERT_EQ(under.test(static_cast<std::size_t>(shown)), shown != 0);
           ++seen[mark == 0 ? 0 : mark == kErased ? 2 : 1];
         }
     }
   }
   for (const int count : seen) EXPECT_GT(count, 100);
+}
+
+TEST(CorrectedPlane, AllBonesOfAnIslandAreUnderAVoxelThatNobodyCorrected) {
+  const ScanGeometry scan = geometry_of(oblique_grid());
+  BonesOfIslands bones{};
+  bones[2].set(3).set(7);
+  EXPECT_EQ(bones_at(scan, halves(scan), bones, {20, 5, 5}, {}), bones[2]);
+  EXPECT_TRUE(bones_at(scan, halves(scan), bones, {2, 5, 5}, {}).none());
 }
 
 TEST(CorrectedPlane, WithoutCorrectionsThereAreNoMarks) {

@@ -73,21 +73,6 @@ TEST(EditHistory, EveryKindOfEditIsAStep) {
   }
 }
 
-// A long stroke in a thousand states is there once.
-TEST(EditHistory, StatesShareTheirStrokes) {
-  EditHistory history;
-  const auto stroke = std::make_shared<const Correction>(Correction{.points_mm = std::vector<Vec3>(1000)});
-  ImagingEdits edits;
-  edits.corrections.push_back(stroke);
-  for (int i = 0; i < 1000; ++i) {
-    edits.threshold_hu += 1.0;
-    history.apply(edits);
-  }
-  EXPECT_EQ(history.now().corrections.front().get(), stroke.get());
-  history.undo();
-  EXPECT_EQ(history.now().corrections.front().get(), stroke.get());
-}
-
 TEST(EditHistory, AnEditThatChangesNothingIsNoStep) {
   EditHistory history;
   history.apply(history.now());

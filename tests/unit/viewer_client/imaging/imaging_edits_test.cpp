@@ -154,5 +154,21 @@ TEST(ImagingEdits, WhatComesToNothingIsLeftOutWhenTheBoneIsMade) {
                                            edits.corrections[6], edits.corrections[7]}));
 }
 
+// The importer sees the parts of a long stroke one by one.
+TEST(ImagingEdits, APartOfALongStrokeBesideTheBoxIsLeftOut) {
+  ScanGeometry scan;
+  scan.dims = {20, 20, 20};
+  ImagingEdits edits;
+  edits.box = MarkedBox{{5, 5, 5}, {10, 10, 10}};
+  Correction stroke{CorrectionKind::erase, 0, {}, 0.1};
+  for (int i = 0; i < 1000; ++i) stroke.points_mm.emplace_back(1, 1 + i % 2, 1);
+  for (int i = 0; i < 500; ++i) stroke.points_mm.emplace_back(7, 7 + i % 2, 7);
+  edits.corrections = {shared(stroke)};
+  const ImagingEdits made = made_edits(edits, {}, scan);
+  ASSERT_EQ(made.corrections.size(), 1u);
+  EXPECT_EQ(made.corrections[0]->points_mm, std::vector<Vec3>(stroke.points_mm.begin() + 999, stroke.points_mm.end()));
+  EXPECT_EQ(made.corrections[0]->radius_mm, 0.1);
+}
+
 }  // namespace
 }  // namespace osteon
