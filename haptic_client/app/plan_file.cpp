@@ -71,7 +71,9 @@ void only(const json& object, const std::set<std::string>& known) {
 
 PlanEntry read_entry(const json& step) {
   if (!step.contains("entry") || !step.at("entry").is_object())
-    throw Wrong("\"entry\" is missing; give {\"toward\": [x, y, z]} or {\"point_mm\": [x, y, z], \"axis\": [x, y, z]}");
+    throw Wrong(
+        "\"entry\" is missing; give {\"toward\": [x, y, z]}, or {\"point_mm\": [x, y, z]} with \"axis\" or "
+        "\"target_mm\"");
   const json& entry = step.at("entry");
   only(entry, {"toward", "point_mm", "axis", "target_mm", "beside_last_mm"});
   PlanEntry result;
@@ -87,7 +89,9 @@ PlanEntry read_entry(const json& step) {
   }
   if (entry.contains("beside_last_mm")) result.beside_last_mm = numbers<2>(entry, "beside_last_mm");
   if (result.toward.has_value() + result.point_mm.has_value() + result.beside_last_mm.has_value() != 1)
-    throw Wrong("\"entry\" needs exactly one of \"toward\", \"point_mm\" with \"axis\", and \"beside_last_mm\"");
+    throw Wrong(
+        "\"entry\" needs exactly one of \"toward\", \"point_mm\" with \"axis\" or \"target_mm\", and "
+        "\"beside_last_mm\"");
   return result;
 }
 

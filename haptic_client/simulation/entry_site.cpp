@@ -100,15 +100,17 @@ Result<EntrySite> find_site_toward(const Case& bone, const Vec3& toward) {
 
 Result<EntrySite> find_site_at(const Case& bone, const Vec3& point_mm, const Vec3& axis) {
   if (!(axis.norm() > 1e-9))
-    return failure(ErrorCode::invalid_input, "entry.axis must not be zero; give the direction into the bone");
+    return failure(
+        ErrorCode::invalid_input,
+        "entry.axis must not be zero, nor entry.target_mm at entry.point_mm; give the direction into the bone");
   EntrySite site;
   site.axis = axis.normalized();
   set_across(site);
   const Vec3 from = point_mm - 0.5 * kReach_mm * site.axis;
   const double distance = distance_to_bone_mm(bone, from, site.axis, kReach_mm);
   if (distance < 0.0)
-    return failure(ErrorCode::invalid_input,
-                   "no bone lies within 30 mm of entry.point_mm " + shown_position(point_mm) + " along entry.axis");
+    return failure(ErrorCode::invalid_input, "no bone lies within 30 mm of entry.point_mm " + shown_position(point_mm) +
+                                                 " along entry.axis or towards entry.target_mm");
   site.entry_mm = from + distance * site.axis;
   EntrySite flat = site;
   refine(bone, flat);

@@ -36,8 +36,9 @@ Result<EntrySite> find_site(const Case& bone, const PlanEntry& entry, const Entr
       return failure(ErrorCode::invalid_input, "entry.beside_last_mm needs a step before it; give entry.toward");
     return find_site_beside(bone, *last, (*entry.beside_last_mm)[0], (*entry.beside_last_mm)[1]);
   }
-  return failure(ErrorCode::invalid_input,
-                 "entry is missing; give {\"toward\": [x, y, z]} or {\"point_mm\": [...], \"axis\": [...]}");
+  return failure(
+      ErrorCode::invalid_input,
+      "entry is missing; give {\"toward\": [x, y, z]}, or {\"point_mm\": [...]} with \"axis\" or \"target_mm\"");
 }
 
 // From the tip to where the hand holds the tool: a hand that strays also tilts it.

@@ -78,6 +78,8 @@ class PlanTest : public test::WindowBench {
     click(*slices_[1], target_mm);
     ASSERT_TRUE(until([&] { return in_room(1) && shown(); })) << problem();
   }
+  // The room has answered.
+  [[nodiscard]] bool settled() const { return !bar_->plan().waits(); }
   [[nodiscard]] std::vector<Annotation> planned() const { return bar_->plan().planned(); }
   // The room has numbered so many of them.
   [[nodiscard]] bool in_room(std::size_t count) const {
@@ -190,18 +192,15 @@ TEST_F(PlanTest, AnAxisOnTheSlicesIsSeenMeasuredMovedTakenBackAndKept) {
 
   // An end moves by a drag, and undo takes that back.
   drag(*slices_[1], from_steps(drawn.points[1]), moved);
-  ASSERT_TRUE(until([&] { return in_room(1) && planned()[0].points[1] != drawn.points[1]; }));
+  ASSERT_TRUE(until([&] { return settled() && in_room(1) && planned()[0].points[1] != drawn.points[1]; }));
   EXPECT_NEAR((from_steps(planned()[0].points[1]) - moved).norm(), 0.0, 2.0 * pixel_mm);
   EXPECT_EQ(planned()[0].points[0], drawn.points[0]);
-  QTest::qWait(200);
   trigger("plan_undo");
-  EXPECT_TRUE(until([&] { return in_room(1) && planned()[0].points == drawn.points; })) << problem();
+  EXPECT_TRUE(until([&] { return settled() && in_room(1) && planned()[0].points == drawn.points; })) << problem();
   trigger("plan_wipe");
-  EXPECT_TRUE(until([&] { return planned().empty() && blue_pixels() < blue_before + 5; })) << problem();
-  QTest::qWait(200);
+  EXPECT_TRUE(until([&] { return settled() && planned().empty() && blue_pixels() < blue_before + 5; })) << problem();
   trigger("plan_undo");
-  EXPECT_TRUE(until([&] { return in_room(1) && planned()[0].points == drawn.points; })) << problem();
-  QTest::qWait(500);
+  EXPECT_TRUE(until([&] { return settled() && in_room(1) && planned()[0].points == drawn.points; })) << problem();
 
   // The session keeps it, and the next one may change it.
   const std::filesystem::path kept = session();

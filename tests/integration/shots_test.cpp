@@ -282,5 +282,16 @@ TEST_F(ShotsTest, AnObserversShotsStayInTheirWindow) {
   EXPECT_FALSE(tree_of(other_arm.panel()).isVisible());
 }
 
+// Of the same room: a plan is for everybody, as the shots are.
+TEST_F(ShotsTest, OnlyAnInstructorPlans) {
+  const auto* draw = window_->findChild<QAction*>("draw_axis");
+  join("ben", Role::trainee);
+  EXPECT_TRUE(until([&] { return !draw->isEnabled(); }));
+  EXPECT_EQ(draw->toolTip().toStdString(), "Only an instructor plans in this room.");
+  join("ada", Role::instructor);
+  QTest::qWait(1000);
+  EXPECT_TRUE(draw->isEnabled());
+}
+
 }  // namespace
 }  // namespace osteon

@@ -657,6 +657,8 @@ void MainWindow::refresh_gauges() {
     gauges_->show(state, hand, 1e-3 * static_cast<double>(clock_.elapsed()));
     show_offset(state);
     show_other_hand(state);
+  } else {
+    gauges_->show_plan({}, {});
   }
   const std::vector<HeldTool> tools = held_tools(states, people, own_name);
   // The tip of the own tool, also where another one is nearer to a structure. Who has no hand sees that of the only

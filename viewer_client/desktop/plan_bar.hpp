@@ -68,17 +68,26 @@ class PlanBar : public QWidget {
  private:
   void begin(AnnotationKind kind);
   void rename();
+  void wipe();
+  void undo();
+  // Says so if the last change waits for the room.
+  [[nodiscard]] bool must_wait() const;
+  // Disables what the role of this window's user does not allow.
+  void disable(const RoomLink& room);
   void choose_file();
   void show();
   void send(const std::optional<DrawnPlan::Change>& change, const QString& done);
   [[nodiscard]] QString new_name() const;
+  // Built in, or of the room. None: unknown.
+  [[nodiscard]] std::optional<ToolKind> kind_of(const std::string& tool) const;
   // That of the own hand, or a usual one.
   [[nodiscard]] std::string drill() const;
 
   Window window_;
   DrawnPlan plan_;
   QComboBox* choice_ = nullptr;
-  QAction* draw_axis_ = nullptr;  // disabled for who only watches
+  std::vector<QAction*> changes_;  // what changes the plan; disabled for who only watches
+  bool let_go_ = false;            // the mouse still drags an end that was put back
 };
 
 }  // namespace osteon

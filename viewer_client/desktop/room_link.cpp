@@ -2,32 +2,12 @@
 
 #include <QCoreApplication>
 #include <QMetaObject>
-#include <algorithm>
 #include <chrono>
 #include <utility>
 
 #include "viewer_client/net/people_client.hpp"
 
 namespace osteon {
-
-namespace {
-
-// A drawing of an earlier session, or of another person, has another author. Only its author may change it, so a new
-// one takes its place.
-Result<std::uint32_t> redraw(PeopleClient& people, const DrawnPlan::Change& change) {
-  const std::vector<Annotation> now = people.annotations();
-  const bool own = change.before && std::ranges::any_of(now, [&](const Annotation& one) {
-                     return one.id == change.before->id && one.author == people.self();
-                   });
-  if (change.before && !(own && change.after))
-    if (const Result<void> gone = people.wipe_off(change.before->id); !gone) return tl::unexpected(gone.error());
-  if (!change.after) return 0;
-  Annotation drawn = *change.after;
-  drawn.id = own ? change.before->id : 0;
-  return people.draw(drawn);
-}
-
-}  // namespace
 
 RoomLink::RoomLink(const RoomSubscriptionOptions& options, Events events) : events_(std::move(events)) {
   queue_.set_wake([this] { in_gui(events_.arrived); });
@@ -99,8 +79,10 @@ void RoomLink::draw(const DrawnPlan::Change& change, std::function<void(const Re
   if (people_ == nullptr) return answered(failure(ErrorCode::unavailable, "there is no room yet"));
   {
     const MutexLock lock(mutex_);
-    jobs_.push_back([this, people = people_, change, answered = std::move(answered)](RoomSubscription&) {
-      const Result<std::uint32_t> answer = redraw(*people, change);
+    jobs_.push_back([this, people = people_, change, answered = std::move(answered)](RoomSubscription& room) {
+      const PlanRequests requests{[&room](const Annotation& drawn) { return room.draw(drawn); },
+                                  [&room](std::uint32_t id) { return room.wipe_off(id); }};
+      const Result<std::uint32_t> answer = carry_out(change, people->annotations(), people->self(), requests);
       in_gui([answered, answer] { answered(answer); });
     });
   }

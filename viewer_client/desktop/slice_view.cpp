@@ -247,7 +247,7 @@ void SliceView::use_left_button(const QPointF& place) {
 }
 
 void SliceView::mousePressEvent(QMouseEvent* event) {
-  last_ = event->pos();
+  last_ = pressed_ = event->pos();
   if (!image_ || event->button() != Qt::LeftButton) return;
   const QPointF place = place_under(*event);
   drew_ = overlay_.draws;
@@ -259,7 +259,10 @@ void SliceView::mousePressEvent(QMouseEvent* event) {
 void SliceView::mouseReleaseEvent(QMouseEvent* event) {
   if (event->button() != Qt::LeftButton) return;
   drew_ = false;
-  if (std::exchange(held_, std::nullopt)) events_.dropped();
+  if (!std::exchange(held_, std::nullopt)) return;
+  events_.dropped();
+  // A click that drags nothing is for the cross.
+  if (image_ && event->pos() == pressed_) events_.point(point_at(place_under(*event)));
 }
 
 void SliceView::mouseMoveEvent(QMouseEvent* event) {

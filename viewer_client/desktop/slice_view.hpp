@@ -113,7 +113,7 @@ class SliceView : public QWidget {
   QImage grey_;
   SliceOverlay overlay_;
   std::vector<OutlinePart> outline_;
-  QPoint last_;              // of the mouse
+  QPoint last_, pressed_;    // of the mouse
   std::optional<End> held_;  // while the left button drags it
   bool drew_ = false;        // the left button, which is still down, gave a point
 };

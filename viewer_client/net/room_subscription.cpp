@@ -588,6 +588,22 @@ Result<RoomAnswer> RoomSubscription::share_shots(const ShotRun& run, const ShotT
                  "the server is older than this window; install a newer Osteon where the server runs");
 }
 
+Result<std::uint32_t> RoomSubscription::draw(const Annotation& drawn) {
+  v1::AnnotateRequest request;
+  *request.mutable_drawn() = wire::to_wire(drawn);
+  const auto answer = impl_->ask_as_author(&v1::PeopleService::Stub::Annotate, request);
+  if (!answer) return tl::unexpected(answer.error());
+  return answer->annotation();
+}
+
+Result<void> RoomSubscription::wipe_off(std::uint32_t annotation) {
+  v1::AnnotateRequest request;
+  request.set_wipe_off(annotation);
+  const auto answer = impl_->ask_as_author(&v1::PeopleService::Stub::Annotate, request);
+  if (!answer) return tl::unexpected(answer.error());
+  return {};
+}
+
 Result<RoomAnswer> RoomSubscription::undo(std::uint32_t count) {
   v1::UndoRequest request;
   request.set_count(count);

@@ -12,6 +12,7 @@
 #include "common/core/result.hpp"
 #include "common/geometry/lattice.hpp"
 #include "common/surface/view_frustum.hpp"
+#include "common/tools/annotation.hpp"
 #include "common/tools/c_arm_shot.hpp"
 #include "common/volume/case_cache.hpp"
 #include "common/wire/credentials.hpp"
@@ -78,6 +79,9 @@ class RoomSubscription {
   // The newest press of the own C-arm so far, for the others in the room. Also: denied (an observer's shots are not for
   // others), unsupported (the server is too old).
   [[nodiscard]] Result<RoomAnswer> share_shots(const ShotRun& run, const ShotTotals& session);
+  // Draws for all; with a number it changes an own drawing. The answer is its number. Also: denied (the role may not).
+  [[nodiscard]] Result<std::uint32_t> draw(const Annotation& drawn);
+  [[nodiscard]] Result<void> wipe_off(std::uint32_t annotation);
   [[nodiscard]] Result<RoomAnswer> undo(std::uint32_t count);
   [[nodiscard]] Result<RoomAnswer> undo_to(RoomSeq mark);
   [[nodiscard]] Result<RoomAnswer> mark(const std::string& label);

@@ -40,7 +40,7 @@ constexpr int kLabelText = 16, kNameText = 15, kSaidText = 19, kHoldingText = 22
 constexpr double kCharacter = 0.52;
 // Opacities of what lies behind the bone, and of planes.
 constexpr double kThrough = 0.22, kThroughPlane = 0.12, kPlane = 0.3;
-constexpr double kLeastPlane_mm = 30.0;  // the shorter side of its rectangle
+constexpr double kLeastPlane_mm = 30.0;  // a side of its square
 constexpr std::uint32_t kStroke = 0xffd040;
 
 using Rgb = std::array<double, 3>;
@@ -79,8 +79,8 @@ vtkSmartPointer<vtkActor> shape_actor(vtkAlgorithmOutput* shape, std::uint32_t c
   return actor;
 }
 
-// A rectangle about the line of its first two points.
-vtkSmartPointer<vtkPlaneSource> rectangle_about(const std::vector<Vec3>& points_mm) {
+// A square about the line of its first two points.
+vtkSmartPointer<vtkPlaneSource> square_about(const std::vector<Vec3>& points_mm) {
   const Vec3 line = points_mm[1] - points_mm[0], along = line.normalized();
   const Vec3 across = (points_mm[2] - points_mm[0] - along.dot(points_mm[2] - points_mm[0]) * along).normalized();
   const double half_mm = 0.5 * std::max(kLeastPlane_mm, line.norm());
@@ -214,7 +214,7 @@ vtkAlgorithmOutput* PeopleOverlay::Impl::shape_of(Drawn& one) {
     case AnnotationKind::label:
       return ball->GetOutputPort();
     case AnnotationKind::plane:
-      one.plane = rectangle_about(one.points_mm);
+      one.plane = square_about(one.points_mm);
       return one.plane->GetOutputPort();
     case AnnotationKind::line:
     case AnnotationKind::axis:

@@ -72,7 +72,7 @@ void DrawnPlan::begin(AnnotationKind kind) {
 void DrawnPlan::give_up() {
   kind_.reset();
   first_mm_.reset();
-  if (!edited_ || asked_ || answered_) return;
+  if (!drags()) return;
   edited_.reset();
   show();
 }
@@ -87,6 +87,7 @@ Result<std::optional<DrawnPlan::Change>> DrawnPlan::add_point(const Vec3& point_
   Annotation drawn = drawn_through(*kind_, *first_mm_, point_mm, into_image);
   drawn.words = name;
   if (const Result<void> sound = check(drawn); !sound) return tl::unexpected(sound.error());
+  if (asked_) return failure(ErrorCode::unavailable, "the last change waits for the room");
   give_up();
   return ask({std::nullopt, std::move(drawn)}, false);
 }
@@ -128,7 +129,7 @@ std::optional<DrawnPlan::Change> DrawnPlan::ask(Change change, bool is_undo) {
 }
 
 std::optional<DrawnPlan::Change> DrawnPlan::drop() {
-  if (!edited_ || asked_ || answered_) return std::nullopt;
+  if (!drags()) return std::nullopt;
   if (edited_->before == edited_->after) {
     edited_.reset();
     return std::nullopt;
@@ -157,11 +158,12 @@ std::optional<DrawnPlan::Change> DrawnPlan::undo() {
   return ask({done_.back().after, done_.back().before}, true);
 }
 
-void DrawnPlan::answered(std::optional<std::uint32_t> id) {
+void DrawnPlan::answered(const Result<std::uint32_t>& id) {
   if (!asked_) return;
   asked_ = false;
   if (!id) {
-    if (is_undo_) done_.pop_back();  // what somebody else has changed meanwhile cannot be undone
+    // What somebody else has changed meanwhile cannot be undone.
+    if (is_undo_ && id.error().code != ErrorCode::unavailable) done_.pop_back();
     edited_.reset();
     return show();
   }
@@ -182,6 +184,25 @@ void DrawnPlan::answered(std::optional<std::uint32_t> id) {
   answered_ = !is_in_room();
   if (!answered_) edited_.reset();
   show();
+}
+
+Result<std::uint32_t> carry_out(const DrawnPlan::Change& change, std::span<const Annotation> now, AuthorId self,
+                                const PlanRequests& room) {
+  const std::uint32_t old = id_of(change.before);
+  const bool own = std::ranges::any_of(now, [&](const Annotation& one) { return one.id == old && one.author == self; });
+  const bool full = now.size() >= kMostAnnotations;
+  const bool replaces = change.before && change.after && !own;
+  if (change.before && (!change.after || (replaces && full)))
+    if (const Result<void> gone = room.wipe_off(old); !gone) return tl::unexpected(gone.error());
+  if (!change.after) return 0;
+  Annotation drawn = *change.after;
+  drawn.id = own ? old : 0;
+  const Result<std::uint32_t> id = room.draw(drawn);
+  if (!id || !replaces || full) return id;
+  const Result<void> gone = room.wipe_off(old);
+  if (gone) return id;
+  (void)room.wipe_off(*id);  // it is not there twice
+  return tl::unexpected(gone.error());
 }
 
 std::string plan_text(std::span<const Annotation> planned, const std::string& tool) {

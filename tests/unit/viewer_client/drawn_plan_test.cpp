@@ -84,9 +84,69 @@ TEST_F(Planning, WhatTheRoomRefusesVanishes) {
   plan_.begin(AnnotationKind::axis);
   ASSERT_TRUE(plan_.add_point({0, 0, 0}, Vec3::UnitZ(), "a"));
   ASSERT_TRUE(plan_.add_point({0, 0, -9}, Vec3::UnitZ(), "a"));
-  plan_.answered(std::nullopt);
+  plan_.answered(failure(ErrorCode::denied, "no"));
   EXPECT_TRUE(plan_.shown().empty());
   EXPECT_FALSE(plan_.undo());
+}
+
+TEST_F(Planning, ASecondPointWaitsForTheLastChange) {
+  draw(AnnotationKind::axis, {0, 0, 0}, {0, 0, -20});
+  const auto wiped = plan_.wipe();
+  EXPECT_TRUE(plan_.waits());
+  plan_.begin(AnnotationKind::axis);
+  ASSERT_TRUE(plan_.add_point({5, 0, 0}, Vec3::UnitZ(), "b"));
+  EXPECT_FALSE(plan_.add_point({5, 0, -9}, Vec3::UnitZ(), "b"));
+  EXPECT_TRUE(plan_.draws()) << "it is not lost";
+  take(wiped);
+  EXPECT_FALSE(plan_.waits());
+  const auto drawn = plan_.add_point({5, 0, -9}, Vec3::UnitZ(), "b");
+  EXPECT_TRUE(drawn && *drawn);
+}
+
+TEST_F(Planning, UndoIsAskedAgainAfterALostConnection) {
+  draw(AnnotationKind::axis, {0, 0, 0}, {0, 0, -20});
+  ASSERT_TRUE(plan_.undo());
+  plan_.answered(failure(ErrorCode::unavailable, "no answer"));
+  EXPECT_EQ(plan_.shown(), room_);
+  ASSERT_TRUE(plan_.undo());
+  plan_.answered(failure(ErrorCode::not_found, "the room has no annotation 11"));
+  EXPECT_FALSE(plan_.undo()) << "another has changed it";
+}
+
+// A room that writes down what it is asked for.
+TEST(CarryOut, NothingIsWipedBeforeItsReplacementIsThere) {
+  static constexpr AuthorId kSelf{3}, kOther{4};
+  static constexpr std::uint32_t kOld = 7, kNew = 12;
+  const Annotation old{.id = kOld, .author = kOther, .kind = AnnotationKind::axis};
+  const Change move{old, old}, wipe{old, std::nullopt};
+  const auto asked = [](const Change& change, const std::vector<Annotation>& now, std::uint32_t refused_draw = 99,
+                        std::uint32_t refused_wipe = 99) {
+    std::vector<std::string> calls;
+    const PlanRequests room{[&](const Annotation& drawn) -> Result<std::uint32_t> {
+                              calls.push_back("draw " + std::to_string(drawn.id));
+                              if (drawn.id == refused_draw) return failure(ErrorCode::unavailable, "no answer");
+                              return drawn.id == 0 ? kNew : drawn.id;
+                            },
+                            [&](std::uint32_t id) -> Result<void> {
+                              calls.push_back("wipe " + std::to_string(id));
+                              if (id == refused_wipe) return failure(ErrorCode::not_found, "it is gone");
+                              return {};
+                            }};
+    const Result<std::uint32_t> id = carry_out(change, now, kSelf, room);
+    calls.push_back(id ? std::to_string(*id) : id.error().message);
+    return calls;
+  };
+  using Calls = std::vector<std::string>;
+  EXPECT_EQ(asked(move, {old}), (Calls{"draw 0", "wipe 7", "12"}));
+  EXPECT_EQ(asked(move, {old}, 0), (Calls{"draw 0", "no answer"})) << "the old one stays";
+  EXPECT_EQ(asked(move, {old}, 99, kOld), (Calls{"draw 0", "wipe 7", "wipe 12", "it is gone"}));
+  EXPECT_EQ(asked(wipe, {old}), (Calls{"wipe 7", "0"}));
+  Annotation own = old;
+  own.author = kSelf;
+  EXPECT_EQ(asked(move, {own}), (Calls{"draw 7", "7"}));
+  EXPECT_EQ(asked({std::nullopt, old}, {}), (Calls{"draw 0", "12"}));
+  EXPECT_EQ(asked(move, std::vector<Annotation>(kMostAnnotations, old)), (Calls{"wipe 7", "draw 0", "12"}))
+      << "the room takes no more";
 }
 
 TEST_F(Planning, APointAtTheFirstOneMayBeGivenAgain) {

@@ -1740,6 +1740,26 @@
         <translation>Nichts ist geplant</translation>
     </message>
     <message>
+        <source>Nothing is chosen</source>
+        <translation>Nichts ist gewählt</translation>
+    </message>
+    <message>
+        <source>Only an instructor plans in this room.</source>
+        <translation>In diesem Raum planen nur Lehrende.</translation>
+    </message>
+    <message>
+        <source>The last change of the plan is still on its way. Try again.</source>
+        <translation>Die letzte Änderung der Planung ist noch unterwegs. Versuchen Sie es noch einmal.</translation>
+    </message>
+    <message>
+        <source>You have changed nothing in the plan that could be undone.</source>
+        <translation>Sie haben in der Planung nichts geändert, das rückgängig gemacht werden könnte.</translation>
+    </message>
+    <message>
+        <source>The line is too short, or goes straight into the picture. Click elsewhere.</source>
+        <translation>Die Linie ist zu kurz oder geht gerade in das Bild hinein. Klicken Sie woanders.</translation>
+    </message>
+    <message>
         <source>Draw an &amp;axis</source>
         <translation>&amp;Achse zeichnen</translation>
     </message>

@@ -76,6 +76,16 @@ class PlanSchema(unittest.TestCase):
         code, faults = self.by_program([{"steps": 1}, {"steps": VALID}, {"steps": 2}])
         self.assertEqual((code, [fault != "" for fault in faults]), (1, [True, False, True]))
 
+    def test_both_refuse_an_entry_with_too_little_or_too_much(self):
+        point, axis, target = [1.0, 2.0, 3.0], [0.0, 0.0, -1.0], [1.0, 2.0, -20.0]
+        plans = [{"steps": [{"action": "drill", "entry": entry}]}
+                 for entry in ({"point_mm": point, "axis": axis, "target_mm": target}, {"point_mm": point},
+                               {"target_mm": target}, {"axis": axis}, {"axis": axis, "target_mm": target})]
+        _, faults = self.by_program(plans)
+        for plan, fault in zip(plans, faults):
+            self.assertFalse(self.by_schema.is_valid(plan))
+            self.assertIn('"point_mm" together with either "axis" or "target_mm"', fault)
+
     def test_both_judge_changed_plans_alike(self):
         chance = random.Random(1)
         plans = [{"steps": [changed(chance.choice(VALID), chance)]} for _ in range(PLANS)]
