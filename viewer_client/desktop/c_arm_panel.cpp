@@ -132,9 +132,9 @@ CArmPanel::CArmPanel(InsideLink& inside, Events events, QWidget* parent)
     mailbox_->panel = this;
   }
   setObjectName("c_arm");
-  const auto image = [this](Mailbox::Receive receive) {
-    return std::make_shared<CArmImage>([to = mailbox_, receive](std::shared_ptr<const CArmPicture> picture) {
-      to->post(std::move(picture), receive);
+  const auto image = [this](Mailbox::Receive receiver) {
+    return std::make_shared<CArmImage>([to = mailbox_, receiver](std::shared_ptr<const CArmPicture> picture) {
+      to->post(std::move(picture), receiver);
     });
   };
   image_ = image(&CArmPanel::receive);

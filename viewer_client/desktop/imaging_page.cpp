@@ -11,6 +11,7 @@
 #include <QLocale>
 #include <QProgressBar>
 #include <QPushButton>
+#include <QScrollArea>
 #include <QSignalBlocker>
 #include <QSpinBox>
 #include <QStackedWidget>
@@ -69,7 +70,11 @@ ImagingPage::ImagingPage(Events events, QWidget* parent)
   stack_->addWidget(series_list_);
   auto* work = new QWidget;
   work->setLayout(make_work());
-  stack_->addWidget(work);
+  auto* scrolled = new QScrollArea;  // a small screen has no room for tools, planes and panels of the window
+  scrolled->setWidgetResizable(true);
+  scrolled->setFrameShape(QFrame::NoFrame);
+  scrolled->setWidget(work);
+  stack_->addWidget(scrolled);
 
   auto* all = new QVBoxLayout(this);
   all->addLayout(make_head());

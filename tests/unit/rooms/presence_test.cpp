@@ -365,7 +365,7 @@ TEST(PeopleHost, ShotsOfACArmGoToEverybodyAndAPressHasOneState) {
 
 TEST(PeopleHost, ShotsAreBoundedAndComeAtMostTenTimesASecond) {
   Lesson lesson;
-  class Reader final : public PresenceSubscriber {
+  class CountedReader final : public PresenceSubscriber {
    public:
     void changed() override { ++times; }
     void end(const std::string&) override {}
