@@ -3,6 +3,7 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 namespace osteon::haptic {
 namespace {
@@ -10,6 +11,7 @@ namespace {
 constexpr double kReach_mm = 60.0;
 constexpr double kLargestGap_mm = 3.0;  // diploe below the threshold is still one bone
 constexpr double kNormalRadius_mm = 3.0;
+constexpr double kRings_mm = 2.0;  // between lines that look for bone
 
 std::string shown_position(const Vec3& v) {
   char text[96];
@@ -29,6 +31,13 @@ double thickness_mm(const Case& bone, const EntrySite& site) {
   for (double at = step_mm; at < 200.0 && at - last_bone_mm < kLargestGap_mm; at += step_mm)
     if (bone.surface_mm(site.entry_mm + at * site.axis) < 0.0) last_bone_mm = at;
   return last_bone_mm;
+}
+
+EntrySite facing(const Vec3& axis) {
+  EntrySite site;
+  site.axis = axis;
+  set_across(site);
+  return site;
 }
 
 // Direction of the surface around the entry: the plane through the points where parallel lines beside it meet bone.
@@ -57,6 +66,22 @@ void refine(const Case& bone, EntrySite& site) {
 
 }  // namespace
 
+namespace {
+
+// Puts the site where a line along its axis through a point first meets bone. False: it meets none.
+bool meet(const Case& bone, const Vec3& through_mm, EntrySite& site) {
+  const double far_mm = bone.bounds().size_mm().norm();
+  const Vec3 from = through_mm - far_mm * site.axis;
+  const double distance = distance_to_bone_mm(bone, from, site.axis, 2.0 * far_mm);
+  if (distance < 0.0) return false;
+  site.entry_mm = from + distance * site.axis;
+  refine(bone, site);
+  site.thickness_mm = thickness_mm(bone, site);
+  return true;
+}
+
+}  // namespace
+
 double distance_to_bone_mm(const Case& bone, const Vec3& from_mm, const Vec3& axis, double reach_mm) {
   const double least_mm = 0.1 * bone.pitch_mm();
   double at = 0.0, before = 0.0;
@@ -81,21 +106,25 @@ double distance_to_bone_mm(const Case& bone, const Vec3& from_mm, const Vec3& ax
 Result<EntrySite> find_site_toward(const Case& bone, const Vec3& toward) {
   if (!(toward.norm() > 1e-9))
     return failure(ErrorCode::invalid_input, "entry.toward must not be zero; give a direction such as [0, 0, 1]");
-  const Vec3 direction = -toward.normalized();
-  const Box box = bone.bounds();
-  const double far_mm = box.size_mm().norm();
-  EntrySite site;
-  site.axis = direction;
-  set_across(site);
-  const Vec3 from = box.centre_mm() - far_mm * direction;
-  const double distance = distance_to_bone_mm(bone, from, direction, 2.0 * far_mm);
-  if (distance < 0.0)
+  EntrySite site = facing(-toward.normalized());
+  if (!meet(bone, bone.bounds().centre_mm(), site))
     return failure(ErrorCode::invalid_input,
                    "no bone lies along entry.toward " + shown_position(toward) + "; choose another direction");
-  site.entry_mm = from + distance * direction;
-  refine(bone, site);
-  site.thickness_mm = thickness_mm(bone, site);
   return site;
+}
+
+Result<EntrySite> find_site_facing(const Case& bone, const Vec3& toward) {
+  const Box box = bone.bounds();
+  const double half_mm = 0.5 * box.size_mm().norm();
+  EntrySite site = facing(-toward.normalized());
+  const Vec3 u = site.across_u, v = site.across_v;
+  for (int ring = 0; ring * kRings_mm <= half_mm; ++ring)
+    for (int i = 0; i < std::max(1, 6 * ring); ++i) {
+      const double angle = 2.0 * std::numbers::pi * i / std::max(1, 6 * ring), radius_mm = ring * kRings_mm;
+      const Vec3 beside_mm = radius_mm * (std::cos(angle) * u + std::sin(angle) * v);
+      if (meet(bone, box.centre_mm() + beside_mm, site)) return site;
+    }
+  return failure(ErrorCode::invalid_input, "the case has no bone; import one with a lower --threshold");
 }
 
 Result<EntrySite> find_site_at(const Case& bone, const Vec3& point_mm, const Vec3& axis) {

@@ -91,7 +91,7 @@ Result<ReadyPlan> make_free_hand(const FreeHandOptions& options, const Case& bon
   if (const Result<void> held = check_held(*tool); !held) return tl::unexpected(held.error());
   const Vec3 toward = options.toward.normalized();
   const Result<EntrySite> site =
-      options.at_mm ? find_site_at(bone, *options.at_mm, toward) : find_site_toward(bone, -toward);
+      options.at_mm ? find_site_at(bone, *options.at_mm, toward) : find_site_facing(bone, -toward);
   if (!site) return tl::unexpected(site.error());
   ReadyPlan ready;
   ReadyStep step;

@@ -14,7 +14,7 @@ struct FreeHandOptions {
   double wear = 1;
   std::string law = {};       // force law by which the tool resists; empty: the tool's own
   Vec3 toward{0, 1, 0};       // viewing direction of the user, patient's frame: from the front unless given otherwise
-  std::optional<Vec3> at_mm;  // the tool waits above this point; none: above the bone's middle
+  std::optional<Vec3> at_mm;  // the tool waits above this point; none: above the bone nearest to the middle
 };
 
 // "front", "back", "left", "right", "top", "bottom" of the patient: where the user looks from. Or "x,y,z": the viewing

@@ -214,6 +214,9 @@ Result<imaging::VoxelMask> find_voxels(const imaging::HuVolume& volume, const Ct
                                        const DensityCalibration& calibration, const imaging::ScanEnds& ends,
                                        std::optional<imaging::BloodPool>& contrast, const KeepGoing& keep_going) {
   auto dense = imaging::dense_voxels(volume, options.threshold_hu, part(keep_going, 0.0, 0.03));
+  if (!dense && dense.error().code == ErrorCode::invalid_input &&
+      std::ranges::find(options.edits, EditKind::box, &LabelEdit::kind) != options.edits.end())
+    return bad_input("the box: " + dense.error().message + " or draw a larger box");
   if (!dense) return dense;
   std::vector<imaging::VoxelRun> equipment;
   dense = take_out_equipment(volume, std::move(*dense), options, calibration, equipment, part(keep_going, 0.03, 0.1));

@@ -236,9 +236,14 @@ TEST_F(ImagingEditsTest, ABoxOnTwoPlanesLimitsTheSearchAndAClickTakesItAway) {
   click("tool_box");
   drag(axial, {31, 4, 12}, {58, 55, 12});
   ASSERT_TRUE(until([&] { return found(1); })) << words();
+  // A stroke beside the box counts nowhere, and becomes no edit.
+  click("tool_paint");
+  drag(axial, {10, 30, 12}, {14, 30, 12});
+  EXPECT_NE(words().find("touched nothing in the box"), std::string::npos) << words();
+  click("tool_box");
   // Above the ball there is no bone.
   drag(coronal, {31, 30, 20}, {58, 30, 23});
-  ASSERT_TRUE(until([&] { return words().find("threshold") != std::string::npos; })) << words();
+  ASSERT_TRUE(until([&] { return words().find("draw a larger box") != std::string::npos; })) << words();
   EXPECT_FALSE(part<QPushButton>("make_bone").isEnabled());
   click("undo_edit");
   ASSERT_TRUE(until([&] { return found(1); })) << words();

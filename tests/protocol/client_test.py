@@ -421,7 +421,8 @@ class Watching(Case):
     def test_the_shots_of_others(self):
         stub = people_grpc.PeopleServiceStub(self.hand.channel)
         shot = types.CArmShot(number=4, time_unix_ms=1796050000123, mode=types.SHOT_MODE_LIVE,
-                              isocentre_mm=types.Vector3(x=1, y=2, z=-5), orbit_rad=0.1, exposure_s=1 / 15,
+                              isocentre_mm=types.Vector3(x=1, y=2, z=-5), translation_mm=types.Vector3(z=-7),
+                              orbit_rad=0.1, exposure_s=1 / 15,
                               air_kerma_at_metre_ugy=2.5, dose_area_gy_cm2=0.0017, seed=2**64 - 1)
         run = types.ShotRun(first_number=3, exposure_s=2 / 15, last=shot)
         counts = types.ShotTotals(shots=4, exposure_s=0.2, dose_area_gy_cm2=0.005)

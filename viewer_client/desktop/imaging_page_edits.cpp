@@ -227,10 +227,13 @@ void ImagingPage::end_drag(bool keep) {
   const int under = bone_at(drag->first()), bone = bone_of_drag(choice_->bone(), under, edits);
   switch (drag->tool()) {
     case ImagingTool::paint:
-    case ImagingTool::erase:
-      edits.corrections.push_back(
-          std::make_shared<const Correction>(drag->stroke(scan, bone, tools_->radius_mm(), tools_->flat())));
+    case ImagingTool::erase: {
+      Correction stroke = drag->stroke(scan, bone, tools_->radius_mm(), tools_->flat());
+      if (!reaches(scan, range_of(scan, edits.box), stroke))
+        return words_->setText(tr("The brush touched nothing in the box. Undo takes the box away."));
+      edits.corrections.push_back(std::make_shared<const Correction>(std::move(stroke)));
       return take(std::move(edits), bone);
+    }
     case ImagingTool::cut: {
       auto cut = drag->cut(scan, bone);
       if (!cut) return words_->setText(tr("Drag a line through the bone. What is to its right is cut off."));

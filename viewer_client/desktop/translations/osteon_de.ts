@@ -948,6 +948,10 @@
         <translation>Die Linie beginnt auf keinem Knochen. Wählen Sie einen.</translation>
     </message>
     <message>
+        <source>The brush touched nothing in the box. Undo takes the box away.</source>
+        <translation>Der Pinsel hat nichts im Kasten berührt. „Rückgängig“ nimmt den Kasten weg.</translation>
+    </message>
+    <message>
         <source>Several bones grow in this part. Choose the bone first.</source>
         <translation>In diesem Teil wachsen mehrere Knochen. Wählen Sie erst einen.</translation>
     </message>

@@ -5,6 +5,7 @@
 
 #include "haptic_client/simulation/free_hand.hpp"
 #include "haptic_client/simulation/surgeon.hpp"
+#include "tests/support/scenes/bones.hpp"
 #include "tests/unit/haptic_client/bench.hpp"
 
 namespace osteon::haptic::test {
@@ -47,6 +48,28 @@ TEST(EntrySite, OfAShellPointsToItsCentre) {
     EXPECT_NEAR(beside->entry_mm.norm(), outer, 0.05);
     EXPECT_NEAR(beside->axis.dot(-beside->entry_mm.normalized()), 1.0, 2e-3);
   }
+}
+
+// Two balls of 10 mm, 8 mm apart, as two legs of a scan. Between them is the middle of the case.
+TEST(EntrySite, FacingAUserIsOnTheBoneNearestToAnEmptyMiddle) {
+  const auto balls = [](const Vec3& p) {
+    return std::min((p - Vec3(-14, 0, 0)).norm(), (p - Vec3(14, 0, 0)).norm()) - 10.0;
+  };
+  const Case bone =
+      osteon::test::make_bone({{-24, -10, -10}, {24, 10, 10}}, 0.5, balls, [](const Vec3&) { return 1.5; });
+  EXPECT_FALSE(find_site_toward(bone, Vec3::UnitY()));
+  const Result<EntrySite> site = find_site_facing(bone, Vec3::UnitY());
+  ASSERT_TRUE(site) << site.error().message;
+  EXPECT_NEAR(balls(site->entry_mm), 0.0, 0.05);
+  EXPECT_GT(site->entry_mm.y(), 0.0) << "on the side of the user";
+  const double beside_mm = std::hypot(site->entry_mm.x(), site->entry_mm.z());
+  EXPECT_GE(beside_mm, 4.0);
+  EXPECT_LE(beside_mm, 4.0 + 2.0);
+
+  const FreeHandOptions options{.tool = "drill-3.2", .toward = -Vec3::UnitY()};
+  EXPECT_TRUE(make_free_hand(options, bone)) << "a person can practise on it";
+  // Where the middle is bone, it is the middle.
+  EXPECT_NEAR((find_site_facing(block_case(), -Vec3::UnitZ())->entry_mm - Vec3::Zero()).norm(), 0.0, 0.05);
 }
 
 TEST(Plan, NamesWhatIsWrong) {
