@@ -15,8 +15,8 @@ struct EntrySite {
 
 // Where a ray from far out along `toward` to the bone's centre first meets bone. Error invalid_input: it meets none.
 [[nodiscard]] Result<EntrySite> find_site_toward(const Case& bone, const Vec3& toward);
-// The same along the parallel line nearest to the centre that meets bone, within 2 mm: the middle of a pelvis, or of two
-// bones, is empty. Error invalid_input: there is no bone.
+// The same along the parallel line nearest to the centre that meets bone, within 2 mm. The middle of a pelvis, or of
+// two bones, is empty. Error invalid_input: there is no bone.
 [[nodiscard]] Result<EntrySite> find_site_facing(const Case& bone, const Vec3& toward);
 // Where the line through `point_mm` along `axis` meets bone, at most 30 mm in front of or behind the point. The axis is
 // used as given.

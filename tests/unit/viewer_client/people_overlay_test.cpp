@@ -80,7 +80,7 @@ TEST_F(PeoplePicture, APlaneIsATranslucentRectangleFromBothSides) {
     const Image image = with({mark(1, AnnotationKind::plane, {first, second, third})});
     const Vec3 tinted = at(image, inside), bone = at(bare_, inside);
     EXPECT_GT(tinted.y() - tinted.x(), bone.y() - bone.x() + 10.0);
-    EXPECT_FALSE(greenish(tinted)) << "the bone is seen through it";
+    EXPECT_GT(tinted.x(), 0.5 * bone.x()) << "the bone, which has more red than the plane, is seen through it";
     EXPECT_EQ(at(image, outside), at(bare_, outside)) << "30 mm high, about its line";
   }
 }
