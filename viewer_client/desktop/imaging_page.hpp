@@ -93,6 +93,8 @@ class ImagingPage : public QWidget {
   void drag_to(const std::array<int, 3>& voxel);
   void end_drag(bool keep);
   void show_drag();
+  // The edits with a seed at the bone nearest to a voxel. None: there is no bone, which it says, or the seed is there.
+  std::optional<ImagingEdits> with_seed(const std::array<int, 3>& voxel, int bone);
   void keep_outside(const std::array<int, 3>& voxel);
   void name_bone(int bone, const QString& name);
   void fade_bone(int bone, int percent);

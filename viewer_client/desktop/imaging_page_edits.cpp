@@ -90,32 +90,35 @@ bool ImagingPage::kept(int island) const {
   });
 }
 
-void ImagingPage::keep_at(const std::array<int, 3>& voxel) {
-  if (!keep_->isEnabled()) return;
+std::optional<ImagingEdits> ImagingPage::with_seed(const std::array<int, 3>& voxel, int bone) {
   const int island = scene_.islands.number(voxel);
   const auto seed = island == 0 ? std::optional<std::array<int, 3>>()
                                 : scene_.islands.seed_near(scene_.scan, island, found_hu(), voxel);
-  if (!seed) return words_->setText(tr("There is no bone at the crosshair. Move it into a tinted part."));
+  if (!seed) {
+    words_->setText(tr("There is no bone at the crosshair. Move it into a tinted part."));
+    return std::nullopt;
+  }
   ImagingEdits edits = history_.now();
   const Vec3 at_mm = centre_of(scene_.scan.geometry, *seed);
-  if (std::ranges::find(edits.seeds, at_mm, &KeptSeed::at_mm) != edits.seeds.end()) return;
-  const int bone = choice_->bone() != 0 ? choice_->bone() : next_bone(edits);
+  if (std::ranges::find(edits.seeds, at_mm, &KeptSeed::at_mm) != edits.seeds.end()) return std::nullopt;
   edits.seeds.push_back({at_mm, bone});
-  words_->setText(tr("Part %1 is kept.").arg(island));
-  take(std::move(edits), bone);
+  return edits;
+}
+
+void ImagingPage::keep_at(const std::array<int, 3>& voxel) {
+  if (!keep_->isEnabled()) return;
+  const int bone = choice_->bone() != 0 ? choice_->bone() : next_bone(history_.now());
+  auto edits = with_seed(voxel, bone);
+  if (!edits) return;
+  words_->setText(tr("Part %1 is kept.").arg(scene_.islands.number(voxel)));
+  take(std::move(*edits), bone);
 }
 
 void ImagingPage::keep_outside(const std::array<int, 3>& voxel) {
-  const int island = scene_.islands.number(voxel);
-  const auto seed = island == 0 ? std::optional<std::array<int, 3>>()
-                                : scene_.islands.seed_near(scene_.scan, island, found_hu(), voxel);
-  if (!seed) return words_->setText(tr("There is no bone at the crosshair. Move it into a tinted part."));
-  ImagingEdits edits = history_.now();
-  const Vec3 at_mm = centre_of(scene_.scan.geometry, *seed);
-  if (std::ranges::find(edits.seeds, at_mm, &KeptSeed::at_mm) != edits.seeds.end()) return;
-  edits.seeds.push_back({at_mm, 0});
+  auto edits = with_seed(voxel, 0);
+  if (!edits) return;
   words_->setText(tr("What touches a bone there is separated from it and left out."));
-  take(std::move(edits), bone_at(voxel));
+  take(std::move(*edits), bone_at(voxel));
 }
 
 void ImagingPage::change_island(const QListWidgetItem* item) {
