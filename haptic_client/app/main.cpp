@@ -356,7 +356,8 @@ int main(int argc, char** argv) {
       "Your hand: from where you look, front (unless said otherwise), back, left, right, top or bottom of the "
       "patient, or the direction x,y,z");
   app.add_option("--at", options.hand.at,
-                 "Your hand: the point x,y,z in mm above which the tool begins; by default the bone's middle");
+                 "Your hand: the point x,y,z in mm above which the tool begins; by default the bone nearest to"
+                 " its middle");
   app.add_option("--rpm", options.hand.spindle_rpm, "Your hand: the spindle's full speed; by default the tool's own");
   app.add_option(
       "--law", options.hand.law,

@@ -19,7 +19,7 @@ struct ToolOperatorOptions {
   std::string device = "simulated";
   std::filesystem::path plan;  // of a simulated hand or a recording
   std::string tool;            // of a person, or of a person's recording
-  // Of a person. Defaults: from the front, above the bone's middle, the tool's own speed and law, sharp.
+  // Of a person. Defaults: from the front, above the bone nearest to its middle, the tool's own speed and law, sharp.
   std::optional<std::string> view, at;  // read_view(), read_point()
   std::optional<double> spindle_rpm;
   std::optional<std::string> law;

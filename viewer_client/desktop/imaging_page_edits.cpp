@@ -233,7 +233,7 @@ void ImagingPage::end_drag(bool keep) {
     case ImagingTool::erase: {
       Correction stroke = drag->stroke(scan, bone, tools_->radius_mm(), tools_->flat());
       if (!reaches(scan, range_of(scan, edits.box), stroke))
-        return words_->setText(tr("The brush touched nothing in the box. Undo takes the box away."));
+        return words_->setText(tr("The brush touched nothing in the box. A click with the tool Box takes it away."));
       edits.corrections.push_back(std::make_shared<const Correction>(std::move(stroke)));
       return take(std::move(edits), bone);
     }

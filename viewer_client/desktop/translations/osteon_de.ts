@@ -948,8 +948,8 @@
         <translation>Die Linie beginnt auf keinem Knochen. Wählen Sie einen.</translation>
     </message>
     <message>
-        <source>The brush touched nothing in the box. Undo takes the box away.</source>
-        <translation>Der Pinsel hat nichts im Kasten berührt. „Rückgängig“ nimmt den Kasten weg.</translation>
+        <source>The brush touched nothing in the box. A click with the tool Box takes it away.</source>
+        <translation>Der Pinsel hat nichts im Quader berührt. Mit „Quader“ nimmt ein Klick ihn weg.</translation>
     </message>
     <message>
         <source>Several bones grow in this part. Choose the bone first.</source>
