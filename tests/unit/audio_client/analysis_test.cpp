@@ -542,7 +542,8 @@ TEST_F(AnalyseProgram, WithoutAFolderItOnlySays) {
   ASSERT_EQ(said.exit_code, 0) << said.err;
   EXPECT_THAT(said.out, testing::AllOf(testing::HasSubstr("cortical"), testing::HasSubstr("motor mesh"),
                                        testing::HasSubstr("times as fast")));
-  EXPECT_EQ(said.err, "");
+  // On a busy computer, this short work may last long enough to show its progress.
+  for (const std::string& line : lines_of(said.err)) EXPECT_THAT(line, testing::StartsWith("analysing: "));
 }
 
 TEST_F(AnalyseProgram, APartHasItsOwnTimes) {
