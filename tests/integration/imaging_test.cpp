@@ -4,6 +4,7 @@
 
 #include <QApplication>
 #include <QComboBox>
+#include <QDockWidget>
 #include <QFileDialog>
 #include <QLabel>
 #include <QListWidget>
@@ -63,6 +64,12 @@ class ImagingTest : public test::ImagingBench {
     for (int i = 0; i < islands().count(); ++i) all.push_back(islands().item(i)->checkState() == Qt::Checked);
     return all;
   }
+  [[nodiscard]] QStringList panels_shown() const {
+    QStringList names;
+    for (const QDockWidget* panel : window_->findChildren<QDockWidget*>())
+      if (!panel->isHidden()) names << panel->objectName();
+    return names;
+  }
   // The step has ended with one sentence, and another scan can be opened.
   [[nodiscard]] std::string refused() {
     EXPECT_TRUE(until([&] { return idle() && !words().empty(); }));
@@ -94,7 +101,10 @@ class FolderChooser : public QObject {
 
 TEST_F(ImagingTest, FromAFolderToADrillableBoneInTenClicks) {
   const fs::path folder = series("ct", two_balls());
+  // The panels belong to a room, so image processing gets their place.
+  part<QDockWidget>("c_arm_panel").show();
   click("import");
+  EXPECT_EQ(panels_shown(), QStringList());
   {
     const FolderChooser chooser(QString::fromStdString(folder.string()));
     click("imaging_folder");
@@ -122,6 +132,9 @@ TEST_F(ImagingTest, FromAFolderToADrillableBoneInTenClicks) {
   click("make_bone");
   ASSERT_TRUE(until([&] { return view_->surface_shown(); })) << words() << problem();
   EXPECT_LE(clicks_, 10);
+  EXPECT_TRUE(panels_shown().contains("c_arm_panel"));
+  EXPECT_TRUE(panels_shown().contains("gauges_panel"));
+  part<QDockWidget>("c_arm_panel").hide();
 
   // One ball and not the other, as large as the formula says. Voxels of 1 mm show its volume to within 5 %.
   const fs::path made = cases_folder() / "ct";

@@ -755,7 +755,7 @@ void MainWindow::closeEvent(QCloseEvent* event) {
   saver_.reset();
   QSettings settings;
   settings.setValue("window/geometry", saveGeometry());
-  settings.setValue("window/state", saveState());
+  settings.setValue("window/state", room_layout_.isEmpty() ? saveState() : room_layout_);
   if (maker_) maker_->cancel();
   imaging_->cancel();
   checker_.reset();

@@ -115,6 +115,7 @@ class MainWindow : public QMainWindow {
   // again.
   void make_anew(const RecentEntry& entry);
   void make_imaging_page();
+  void lay_out_page();
   void choose_scan();
   void choose_case();
   void save_bone_as();
@@ -152,6 +153,7 @@ class MainWindow : public QMainWindow {
   void set_watching(bool on);
 
   QStackedWidget* pages_ = nullptr;
+  QByteArray room_layout_;  // of panels and tools, while the page of image processing has their place
   StartPage* start_ = nullptr;
   ImagingPage* imaging_ = nullptr;
   BoneView* view_ = nullptr;

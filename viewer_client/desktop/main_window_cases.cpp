@@ -1,5 +1,6 @@
 // The cases of the window: made, opened, saved, and made anew when they are damaged.
 #include <QCoreApplication>
+#include <QDockWidget>
 #include <QFileDialog>
 #include <QFileInfo>
 #include <QStackedWidget>
@@ -9,6 +10,7 @@
 #include "viewer_client/desktop/imaging_page.hpp"
 #include "viewer_client/desktop/main_window.hpp"
 #include "viewer_client/desktop/start_page.hpp"
+#include "viewer_client/desktop/tool_bar.hpp"
 
 namespace osteon {
 
@@ -122,6 +124,20 @@ void MainWindow::make_imaging_page() {
                               [this](const std::filesystem::path& bone) { practise(bone); },
                               [this] { pages_->setCurrentWidget(start_); }});
   pages_->addWidget(imaging_);
+  connect(pages_, &QStackedWidget::currentChanged, this, [this] { lay_out_page(); });
+}
+
+// Image processing needs the place of the panels and tools, which belong to a room.
+void MainWindow::lay_out_page() {
+  const bool processes = pages_->currentWidget() == imaging_;
+  if (processes == !room_layout_.isEmpty()) return;
+  if (!processes) {
+    restoreState(std::exchange(room_layout_, {}));
+    return;
+  }
+  room_layout_ = saveState();
+  tools_->hide();
+  for (QDockWidget* panel : findChildren<QDockWidget*>()) panel->hide();
 }
 
 void MainWindow::choose_case() {
