@@ -246,6 +246,37 @@
     </message>
 </context>
 <context>
+    <name>CaseSending</name>
+    <message>
+        <source>Cancelled. The server keeps nothing, and the case here stays.</source>
+        <translation>Abgebrochen. Der Server behält nichts, und der Fall hier bleibt.</translation>
+    </message>
+    <message>
+        <source>Cannot make the folder %1. Choose a place where you may write.</source>
+        <translation>Der Ordner %1 kann nicht angelegt werden. Wählen Sie einen beschreibbaren Ort.</translation>
+    </message>
+    <message>
+        <source>%1 had the case already.</source>
+        <translation>%1 hatte den Fall schon.</translation>
+    </message>
+    <message>
+        <source>%1 has the case now.</source>
+        <translation>%1 hat den Fall nun.</translation>
+    </message>
+    <message>
+        <source>%1 has the case, and the room %2 is open with it.</source>
+        <translation>%1 hat den Fall, und der Raum %2 ist damit offen.</translation>
+    </message>
+    <message>
+        <source>Cancelled. %1 has the case already.</source>
+        <translation>Abgebrochen. %1 hat den Fall schon.</translation>
+    </message>
+    <message>
+        <source>%1 has the case, but did not open the room: %2</source>
+        <translation>%1 hat den Fall, aber der Raum wurde nicht geöffnet: %2</translation>
+    </message>
+</context>
+<context>
     <name>ChildProcess</name>
     <message>
         <source>The disk with %1 is full; make room on the disk.</source>
@@ -1325,24 +1356,12 @@
         <translation>Einem Raum beitreten</translation>
     </message>
     <message>
-        <source>Server, HOST:PORT</source>
-        <translation>Server, HOST:PORT</translation>
-    </message>
-    <message>
         <source>Room (empty: the only one)</source>
         <translation>Raum (leer: der einzige)</translation>
     </message>
     <message>
         <source>Your name</source>
         <translation>Ihr Name</translation>
-    </message>
-    <message>
-        <source>Folder of your certificate</source>
-        <translation>Ordner Ihres Zertifikats</translation>
-    </message>
-    <message>
-        <source>File of your ticket</source>
-        <translation>Datei Ihres Tickets</translation>
     </message>
     <message>
         <source>%1 – Osteon</source>
@@ -1728,6 +1747,61 @@
         <source>&amp;Plan</source>
         <translation>&amp;Planung</translation>
     </message>
+    <message>
+        <source>The case to send</source>
+        <translation>Der Fall zum Senden</translation>
+    </message>
+    <message>
+        <source>S&amp;end a case to a server…</source>
+        <translation>Fall an Server s&amp;enden…</translation>
+    </message>
+</context>
+<context>
+    <name>OthersShots</name>
+    <message>
+        <source>Shots of the others in the room</source>
+        <translation>Aufnahmen der anderen im Raum</translation>
+    </message>
+    <message>
+        <source>Of a person the newest picture is shown, of a line below it that press.</source>
+        <translation>Von einer Person erscheint das neueste Bild, von einer Zeile darunter dieser Druck.</translation>
+    </message>
+    <message>
+        <source>The picture is made again from the bone and the tools as they are when you choose it.</source>
+        <translation>Das Bild wird aus Knochen und Werkzeugen neu berechnet, wie sie bei der Auswahl sind.</translation>
+    </message>
+    <message>
+        <source>Pictures of</source>
+        <translation>Bilder von</translation>
+    </message>
+    <message>
+        <source>Shots</source>
+        <translation>Aufnahmen</translation>
+    </message>
+    <message>
+        <source>Exposure, seconds</source>
+        <translation>Strahlzeit in Sekunden</translation>
+    </message>
+    <message>
+        <source>Dose-area product, nominal</source>
+        <translation>Dosisflächenprodukt, nominal</translation>
+    </message>
+    <message>
+        <source>Mine</source>
+        <translation>Mir</translation>
+    </message>
+    <message>
+        <source>Shot %1, %2</source>
+        <translation>Aufnahme %1, %2</translation>
+    </message>
+    <message>
+        <source>Shots %1 to %2, %3</source>
+        <translation>Aufnahmen %1 bis %2, %3</translation>
+    </message>
+    <message>
+        <source>%1, shot %2</source>
+        <translation>%1, Aufnahme %2</translation>
+    </message>
 </context>
 <context>
     <name>PlanBar</name>
@@ -1922,53 +1996,6 @@
     <message>
         <source>Rename…</source>
         <translation>Umbenennen…</translation>
-    </message>
-</context>
-<context>
-    <name>OthersShots</name>
-    <message>
-        <source>Shots of the others in the room</source>
-        <translation>Aufnahmen der anderen im Raum</translation>
-    </message>
-    <message>
-        <source>Of a person the newest picture is shown, of a line below it that press.</source>
-        <translation>Von einer Person erscheint das neueste Bild, von einer Zeile darunter dieser Druck.</translation>
-    </message>
-    <message>
-        <source>The picture is made again from the bone and the tools as they are when you choose it.</source>
-        <translation>Das Bild wird aus Knochen und Werkzeugen neu berechnet, wie sie bei der Auswahl sind.</translation>
-    </message>
-    <message>
-        <source>Pictures of</source>
-        <translation>Bilder von</translation>
-    </message>
-    <message>
-        <source>Shots</source>
-        <translation>Aufnahmen</translation>
-    </message>
-    <message>
-        <source>Exposure, seconds</source>
-        <translation>Strahlzeit in Sekunden</translation>
-    </message>
-    <message>
-        <source>Dose-area product, nominal</source>
-        <translation>Dosisflächenprodukt, nominal</translation>
-    </message>
-    <message>
-        <source>Mine</source>
-        <translation>Mir</translation>
-    </message>
-    <message>
-        <source>Shot %1, %2</source>
-        <translation>Aufnahme %1, %2</translation>
-    </message>
-    <message>
-        <source>Shots %1 to %2, %3</source>
-        <translation>Aufnahmen %1 bis %2, %3</translation>
-    </message>
-    <message>
-        <source>%1, shot %2</source>
-        <translation>%1, Aufnahme %2</translation>
     </message>
 </context>
 <context>
@@ -2177,6 +2204,84 @@
     <message>
         <source>%1 N</source>
         <translation>%1 N</translation>
+    </message>
+</context>
+<context>
+    <name>SendDialog</name>
+    <message>
+        <source>Send %1 to a server</source>
+        <translation>%1 an einen Server senden</translation>
+    </message>
+    <message>
+        <source>Room to open with it (empty: none)</source>
+        <translation>Raum, der damit aufgeht (leer: keiner)</translation>
+    </message>
+    <message>
+        <source>Progress</source>
+        <translation>Fortschritt</translation>
+    </message>
+    <message>
+        <source>&amp;Send</source>
+        <translation>&amp;Senden</translation>
+    </message>
+    <message>
+        <source>Sends the case. The one on this computer stays as it is.</source>
+        <translation>Sendet den Fall. Der auf diesem Rechner bleibt, wie er ist.</translation>
+    </message>
+    <message>
+        <source>The server checks the case and keeps it. Whoever may open rooms there can send it.</source>
+        <translation>Der Server prüft und behält den Fall. Senden kann, wer dort Räume öffnen darf.</translation>
+    </message>
+    <message>
+        <source>Cancelling…</source>
+        <translation>Wird abgebrochen…</translation>
+    </message>
+    <message>
+        <source>The case is being packed</source>
+        <translation>Der Fall wird gepackt</translation>
+    </message>
+    <message>
+        <source>Connecting to %1</source>
+        <translation>Verbindung zu %1</translation>
+    </message>
+    <message>
+        <source>The case is being sent</source>
+        <translation>Der Fall wird gesendet</translation>
+    </message>
+    <message>
+        <source>The server checks the case</source>
+        <translation>Der Server prüft den Fall</translation>
+    </message>
+    <message>
+        <source>The server opens the room</source>
+        <translation>Der Server öffnet den Raum</translation>
+    </message>
+    <message>
+        <source>The case is being sent. Wait for it, or cancel it.</source>
+        <translation>Der Fall wird gesendet. Warten Sie, oder brechen Sie ab.</translation>
+    </message>
+    <message>
+        <source>Cancel</source>
+        <translation>Abbrechen</translation>
+    </message>
+    <message>
+        <source>&amp;Close</source>
+        <translation>S&amp;chließen</translation>
+    </message>
+</context>
+<context>
+    <name>ServerFields</name>
+    <message>
+        <source>Folder of your certificate</source>
+        <translation>Ordner Ihres Zertifikats</translation>
+    </message>
+    <message>
+        <source>File of your ticket</source>
+        <translation>Datei Ihres Tickets</translation>
+    </message>
+    <message>
+        <source>Server, HOST:PORT</source>
+        <translation>Server, HOST:PORT</translation>
     </message>
 </context>
 <context>
