@@ -701,6 +701,81 @@
     </message>
 </context>
 <context>
+    <name>ImagingLandmarks</name>
+    <message>
+        <source>Name of the next landmark</source>
+        <translation>Name der nächsten Landmarke</translation>
+    </message>
+    <message>
+        <source>Name of the landmark that the next click with Landmark sets. One that is there moves.</source>
+        <translation>Name der Landmarke, die der nächste Klick mit Landmarke setzt oder verschiebt</translation>
+    </message>
+    <message>
+        <source>Centre of the femoral head</source>
+        <translation>Hüftkopfmitte</translation>
+    </message>
+    <message>
+        <source>Greater trochanter</source>
+        <translation>Großer Rollhügel</translation>
+    </message>
+    <message>
+        <source>Medial epicondyle</source>
+        <translation>Innerer Epikondylus</translation>
+    </message>
+    <message>
+        <source>Lateral epicondyle</source>
+        <translation>Äußerer Epikondylus</translation>
+    </message>
+    <message>
+        <source>Tibial tuberosity</source>
+        <translation>Schienbeinrauigkeit</translation>
+    </message>
+    <message>
+        <source>Medial malleolus</source>
+        <translation>Innenknöchel</translation>
+    </message>
+    <message>
+        <source>Lateral malleolus</source>
+        <translation>Außenknöchel</translation>
+    </message>
+    <message>
+        <source>Anterior superior iliac spine</source>
+        <translation>Vorderer oberer Darmbeinstachel</translation>
+    </message>
+    <message>
+        <source>Pubic tubercle</source>
+        <translation>Schambeinhöcker</translation>
+    </message>
+    <message>
+        <source>Landmark</source>
+        <translation>Landmarke</translation>
+    </message>
+    <message>
+        <source>Landmarks</source>
+        <translation>Landmarken</translation>
+    </message>
+    <message>
+        <source>A click shows one, and the next click with Landmark moves it. F2 renames it.</source>
+        <translation>Ein Klick zeigt eine, der nächste mit Landmarke verschiebt sie. F2 benennt um.</translation>
+    </message>
+    <message>
+        <source>Remove</source>
+        <translation>Entfernen</translation>
+    </message>
+    <message>
+        <source>Removes the landmark that is chosen in the list, also with Del</source>
+        <translation>Entfernt die in der Liste gewählte Landmarke, auch mit Entf</translation>
+    </message>
+    <message>
+        <source>Choose a landmark in the list first.</source>
+        <translation>Wählen Sie zuerst eine Landmarke in der Liste.</translation>
+    </message>
+    <message>
+        <source>%1, %2, %3 mm</source>
+        <translation>Bei %1, %2, %3 mm</translation>
+    </message>
+</context>
+<context>
     <name>ImagingPage</name>
     <message>
         <source>table or headrest</source>
@@ -998,6 +1073,46 @@
         <source>Smoothing</source>
         <translation>Glättung</translation>
     </message>
+    <message>
+        <source>No landmark can be called that. Write up to 60 bytes that no other landmark has.</source>
+        <translation>So kann keine Landmarke heißen. Der Name hat bis 60 Byte und gehört keiner anderen.</translation>
+    </message>
+    <message>
+        <source>Name the landmark first: up to 60 bytes, in the field Landmark.</source>
+        <translation>Benennen Sie zuerst die Landmarke: bis 60 Byte, im Feld Landmarke.</translation>
+    </message>
+    <message>
+        <source>%1 is at %2, %3, %4 mm.</source>
+        <translation>%1 liegt bei %2, %3, %4 mm.</translation>
+    </message>
+    <message>
+        <source>A page with pictures and numbers of the bone, beside the case; it opens at the end</source>
+        <translation>Seite mit Bildern und Zahlen des Knochens, neben dem Fall; sie öffnet sich</translation>
+    </message>
+    <message>
+        <source>The bone is made. Its report is in %1.</source>
+        <translation>Der Knochen ist erzeugt. Sein Bericht ist %1.</translation>
+    </message>
+    <message>
+        <source>Ed&amp;ges</source>
+        <translation>Kan&amp;ten</translation>
+    </message>
+    <message>
+        <source>Lines where the HU change most, after Canny</source>
+        <translation>Linien, wo sich die HU am meisten ändern, nach Canny</translation>
+    </message>
+    <message>
+        <source>Finding the edges</source>
+        <translation>Die Kanten werden gesucht</translation>
+    </message>
+    <message>
+        <source>The edges of the scan are shown.</source>
+        <translation>Die Kanten des Scans sind zu sehen.</translation>
+    </message>
+    <message>
+        <source>With a rep&amp;ort</source>
+        <translation>Mit Beri&amp;cht</translation>
+    </message>
 </context>
 <context>
     <name>ImagingPlane</name>
@@ -1126,6 +1241,14 @@
     <message>
         <source>Choose the brush first: Paint or Erase.</source>
         <translation>Wählen Sie zuerst den Pinsel: Malen oder Radieren.</translation>
+    </message>
+    <message>
+        <source>Landmark</source>
+        <translation>Landmarke</translation>
+    </message>
+    <message>
+        <source>Click where the landmark of the field Landmark is. The case keeps it.</source>
+        <translation>Klicken Sie, wo die Landmarke des Feldes liegt. Der Fall behält sie.</translation>
     </message>
 </context>
 <context>
