@@ -11,7 +11,7 @@
 namespace osteon {
 
 namespace {
-constexpr auto kPatience = std::chrono::seconds(10);  // for the connection
+constexpr auto kReachPatience = std::chrono::seconds(10);  // for the connection
 constexpr const char* kArchive = "case.osteon";
 
 QString words_of(const Error& error) { return QString::fromStdString(error.message); }
@@ -94,7 +94,7 @@ void CaseSending::work(const std::filesystem::path& archive) {
   const auto failed = [this](const Error& error) { in_gui([this, why = words_of(error)] { fail(why); }); };
   // As the administrator's program: while the server checks, a slow answer is awaited.
   const auto channel = wire::reach_server(
-      to_.address.toStdString(), wire::ClientKind::haptic, kPatience, [this] { return cancelled_.load(); },
+      to_.address.toStdString(), wire::ClientKind::haptic, kReachPatience, [this] { return cancelled_.load(); },
       to_.credentials);
   if (!channel) return failed(channel.error());
   show(Stage::sending);
