@@ -13,8 +13,7 @@ namespace osteon {
 QCheckBox* ImagingPage::make_report_choice() {
   auto* choice = new QCheckBox(tr("With a rep&ort"));
   choice->setObjectName("with_report");
-  choice->setToolTip(
-      tr("A page with pictures and numbers of the bone, beside the case; it opens at the end"));
+  choice->setToolTip(tr("A page with pictures and numbers of the bone, beside the case; it opens at the end"));
   return choice;
 }
 
