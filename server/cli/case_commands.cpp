@@ -20,7 +20,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-void print_case(const RoomAdminClient::CaseLine& one) {
+void print_case(const wire::StoredCaseLine& one) {
   std::printf("%s  %8.1f MB  [%s]%s\n", to_hex(one.hash).c_str(), static_cast<double>(one.bytes) / 1e6,
               one.title.c_str(), one.known ? "  was here before" : "");
 }
@@ -28,7 +28,7 @@ void print_case(const RoomAdminClient::CaseLine& one) {
 Result<void> list_cases(RoomAdminClient& client) {
   const auto all = client.cases();
   if (!all) return tl::unexpected(all.error());
-  for (const RoomAdminClient::CaseLine& one : *all) print_case(one);
+  for (const wire::StoredCaseLine& one : *all) print_case(one);
   return {};
 }
 
@@ -52,7 +52,10 @@ Result<void> upload(RoomAdminClient& client, const fs::path& from) {
     if (Result<void> done = pack_case(from, archive); !done) return done;
   }
   Progress progress("upload");
-  const auto stored = client.upload_case(archive, [&](double fraction) { progress.update(fraction); });
+  const auto stored = client.upload_case(archive, [&](double fraction) {
+    progress.update(fraction);
+    return true;
+  });
   if (!stored) return tl::unexpected(stored.error());
   print_case(*stored);
   return {};

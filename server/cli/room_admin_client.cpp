@@ -2,39 +2,14 @@
 
 #include <grpcpp/grpcpp.h>
 
-#include <fstream>
-#include <system_error>
 #include <utility>
 
 #include "common/wire/convert.hpp"
 #include "common/wire/room_client.hpp"
-#include "osteon/v1/cases.grpc.pb.h"
 #include "osteon/v1/rooms.grpc.pb.h"
 
 namespace osteon {
 namespace {
-
-Error error_of(const grpc::Status& status) {
-  switch (status.error_code()) {
-    case grpc::StatusCode::INVALID_ARGUMENT:
-      return {ErrorCode::invalid_input, status.error_message()};
-    case grpc::StatusCode::NOT_FOUND:
-      return {ErrorCode::not_found, status.error_message()};
-    case grpc::StatusCode::ALREADY_EXISTS:
-      return {ErrorCode::exists, status.error_message()};
-    case grpc::StatusCode::FAILED_PRECONDITION:
-      return {ErrorCode::unavailable, status.error_message()};
-    case grpc::StatusCode::RESOURCE_EXHAUSTED:
-      return {ErrorCode::exhausted, status.error_message()};
-    case grpc::StatusCode::UNAUTHENTICATED:
-    case grpc::StatusCode::PERMISSION_DENIED:
-      return {ErrorCode::denied, "the server does not do that for you: " + status.error_message()};
-    case grpc::StatusCode::INTERNAL:
-      return {ErrorCode::internal, status.error_message()};
-    default:
-      return {ErrorCode::unavailable, "the server does not answer: " + status.error_message()};
-  }
-}
 
 template <class Response, class Request>
 Result<Response> ask(const std::shared_ptr<grpc::Channel>& channel,
@@ -45,7 +20,7 @@ Result<Response> ask(const std::shared_ptr<grpc::Channel>& channel,
   Response response;
   const auto stub = v1::RoomsService::NewStub(channel);
   const grpc::Status status = (stub.get()->*call)(&context, request, &response);
-  if (!status.ok()) return tl::unexpected(error_of(status));
+  if (!status.ok()) return tl::unexpected(wire::error_of_answer(status));
   return response;
 }
 
@@ -69,12 +44,6 @@ RoomLine line_of(const v1::RoomInfo& info) {
           .watchers = info.watchers(),
           .parent = info.parent(),
           .parent_room_seq = RoomSeq{info.parent_room_seq()}};
-}
-
-Result<RoomAdminClient::CaseLine> line_of(const v1::CaseInfo& info) {
-  const Result<Digest> hash = wire::digest_from_wire(info.case_hash());
-  if (!hash) return failure(ErrorCode::unsupported, "the server does not answer as an Osteon server does");
-  return RoomAdminClient::CaseLine{*hash, info.title(), info.bytes()};
 }
 
 template <class Response>
@@ -178,47 +147,6 @@ Result<RoomAdminClient::Copied> RoomAdminClient::back_up(const std::string& name
   const auto response = ask(channel_, &v1::RoomsService::Stub::BackUpRoom, request);
   if (!response) return tl::unexpected(response.error());
   return Copied{RoomSeq{response->room_seq()}, response->file()};
-}
-
-Result<std::vector<RoomAdminClient::CaseLine>> RoomAdminClient::cases() {
-  grpc::ClientContext context;
-  v1::ListCasesResponse response;
-  const grpc::Status status = v1::CaseService::NewStub(channel_)->ListCases(&context, {}, &response);
-  if (!status.ok()) return tl::unexpected(error_of(status));
-  std::vector<CaseLine> lines;
-  for (const v1::CaseInfo& info : response.cases()) {
-    Result<CaseLine> line = line_of(info);
-    if (!line) return tl::unexpected(line.error());
-    lines.push_back(std::move(*line));
-  }
-  return lines;
-}
-
-Result<RoomAdminClient::CaseLine> RoomAdminClient::upload_case(const std::filesystem::path& archive,
-                                                               const std::function<void(double)>& progress) {
-  constexpr std::size_t kPiece = 256 * 1024;
-  std::error_code error;
-  const std::uint64_t size = std::filesystem::file_size(archive, error);
-  std::ifstream in(archive, std::ios::binary);
-  if (error || !in) return failure(ErrorCode::not_found, archive.string() + " cannot be read: " + error.message());
-  grpc::ClientContext context;
-  v1::UploadCaseResponse response;
-  const auto stub = v1::CaseService::NewStub(channel_);
-  const auto writer = stub->UploadCase(&context, &response);
-  std::string piece(kPiece, '\0');
-  std::uint64_t sent = 0;
-  while (in.read(piece.data(), static_cast<std::streamsize>(kPiece)), in.gcount() > 0) {
-    v1::UploadCaseRequest request;
-    request.set_data(piece.data(), static_cast<std::size_t>(in.gcount()));
-    if (!writer->Write(request)) break;  // the server has said why
-    sent += static_cast<std::uint64_t>(in.gcount());
-    if (progress) progress(static_cast<double>(sent) / static_cast<double>(size));
-  }
-  writer->WritesDone();
-  if (const grpc::Status status = writer->Finish(); !status.ok()) return tl::unexpected(error_of(status));
-  Result<CaseLine> line = line_of(response.stored());
-  if (line) line->known = response.known();
-  return line;
 }
 
 }  // namespace osteon

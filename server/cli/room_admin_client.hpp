@@ -11,6 +11,7 @@
 #include "common/core/digest.hpp"
 #include "common/core/id.hpp"
 #include "common/core/result.hpp"
+#include "common/wire/case_client.hpp"
 #include "common/wire/credentials.hpp"
 
 namespace grpc {
@@ -59,16 +60,12 @@ class RoomAdminClient {
     std::string file;
   };
   [[nodiscard]] Result<Copied> back_up(const std::string& name, const std::string& file_name);
-  struct CaseLine {
-    Digest hash;
-    std::string title;
-    std::uint64_t bytes = 0;
-    bool known = false;  // it existed before the upload
-  };
-  [[nodiscard]] Result<std::vector<CaseLine>> cases();
-  // `archive`: a zip of a case. `progress` gets the fraction that is sent. Errors: also not_found (no such file).
-  [[nodiscard]] Result<CaseLine> upload_case(const std::filesystem::path& archive,
-                                             const std::function<void(double)>& progress);
+  [[nodiscard]] Result<std::vector<wire::StoredCaseLine>> cases() { return wire::list_cases(channel_); }
+  // `archive`: a zip of a case. See wire::upload_case().
+  [[nodiscard]] Result<wire::StoredCaseLine> upload_case(const std::filesystem::path& archive,
+                                                         const KeepGoing& keep_going) {
+    return wire::upload_case(channel_, archive, keep_going);
+  }
 
  private:
   explicit RoomAdminClient(std::shared_ptr<grpc::Channel> channel) : channel_(std::move(channel)) {}

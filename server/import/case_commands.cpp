@@ -38,14 +38,15 @@ constexpr const char* kSuggest = "suggest";
 struct CaseArguments {
   ScanArguments scan;
   std::string input, out, title, legend, spacing, unit = "mm", threshold;
-  std::string keep, grow_by = "volume", window = "400,1800", edges, space = "volume", limits = "100,300";
+  std::string keep, grow_by = "volume", window = "400,1800", edges;
   std::string rods_of, surface = "half", between_slices = "auto", thin_cortex = "off", contrast = "apart";
   std::optional<std::string> calibration, rods;
   std::string labels, report, truth, edits;
   std::vector<std::string> bone_colours, seeds, label_names;
   std::optional<double> pitch_mm, similar_hu;
   FilterArguments filter;
-  double sigma_mm = 1.0, margin_mm = CtOptions{}.margin_mm;
+  EdgeArguments edge;
+  double margin_mm = CtOptions{}.margin_mm;
   double density_g_cm3 = 1.9, metal_hu = CtOptions{}.metal_hu;
   bool rescale_hu = false, json = false, separate = false, merge = false, hollow = false, list = false,
        adaptive = false;
@@ -343,13 +344,9 @@ Result<SliceOptions> slice_options(const CaseArguments& a) {
                      " is not a window; write its centre and its width of at least 1 HU, such "
                      "as 400,1800");
   options.window = {window->first, window->second};
-  const auto limits = parse_pair(a.limits);
-  if (!limits || !(limits->first > 0.0) || !(limits->first <= limits->second))
-    return bad_input("--limits " + a.limits +
-                     " are not limits of a gradient; write the lower and the higher one in "
-                     "HU/mm, above 0, such as 100,300");
-  options.edges = {a.sigma_mm, limits->first, limits->second,
-                   a.space == "slice" ? imaging::EdgeSpace::slice : imaging::EdgeSpace::volume};
+  const auto edges = canny_params(a.edge);
+  if (!edges) return tl::unexpected(edges.error());
+  options.edges = *edges;
   options.content = a.edges == "canny"      ? SliceContent::canny
                     : a.edges == "gradient" ? SliceContent::gradient
                                             : SliceContent::grey;
@@ -566,16 +563,7 @@ void add_slices_command(CLI::App& app, const std::shared_ptr<CaseArguments>& sha
                    "Show edges instead: gradient (how much the HU change, white from the higher limit on) or canny "
                    "(white lines where they change most)")
       ->check(CLI::IsMember({"gradient", "canny"}));
-  slices->add_option("--sigma", a.sigma_mm, "Of edges: smooth with a Gaussian of this sigma first, mm")
-      ->check(number_in(0.0, 10.0))
-      ->capture_default_str();
-  slices
-      ->add_option("--limits", a.limits,
-                   "LOW,HIGH of edges, HU/mm: a line begins at the higher gradient and goes on to the lower one")
-      ->capture_default_str();
-  slices->add_option("--edges-in", a.space, "Find edges in each slice by itself, or in the whole volume")
-      ->check(CLI::IsMember({"slice", "volume"}))
-      ->capture_default_str();
+  add_edge_options(*slices, a.edge);
   commands.push_back({slices, [shared](const StopSignal& stop) { return run_slices(*shared, stop); }});
 }
 

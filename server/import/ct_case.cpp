@@ -74,6 +74,8 @@ Result<void> check_options(const imaging::HuVolume& geometry, const CtOptions& o
     return bad_input("the Gaussian's sigma must be from 0 to 10 mm; give another --gaussian");
   if (!(options.margin_mm >= 0.0 && options.margin_mm <= kMostMargin_mm))
     return bad_input("the margin of the scan must be from 0 to 200 mm; give another --margin");
+  if (const auto sound = check_landmarks(geometry, options.edits); !sound)
+    return bad_input(options.edits_file + ", " + sound.error().message);
   return {};
 }
 
@@ -141,6 +143,9 @@ CaseInfo description(const CtScan& scan, const CtOptions& options, const ScanCal
   info.pitch_mm = pitch_mm;
   info.calibration = calibration.line;
   info.density_from = calibration.provenance;
+  // check_options() has refused a landmark beside the scan.
+  for (const LabelEdit& edit : options.edits)
+    if (edit.kind == EditKind::landmark) info.landmarks.push_back({edit.name, edit.points_mm.front()});
   return info;
 }
 

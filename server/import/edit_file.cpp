@@ -15,7 +15,7 @@ namespace {
 constexpr std::size_t kMostPoints = 1000;
 constexpr double kLeastRadius_mm = 0.05, kMostRadius_mm = 200.0;
 constexpr int kMostBone = imaging::kMostMarkers;
-constexpr std::size_t kLongestLabelName = 60;  // bytes
+constexpr std::size_t kLongestEditName = 60;  // bytes
 constexpr double kMostMinutes = 1e5;
 constexpr YamlList kEditList{"edits", "edit", "write edits: [{kind: erase, centre_mm: [12.5, -3, 40], radius_mm: 2}]",
                              1000};
@@ -36,6 +36,7 @@ const std::vector<EditFields>& edit_kinds() {
       {"outside", EditKind::outside, {"point_mm"}, {}},
       {"box", EditKind::box, {"corner_mm", "opposite_mm"}, {}},
       {"label", EditKind::label, {"bone", "name"}, {"opacity", "minutes"}},
+      {"landmark", EditKind::landmark, {"name", "point_mm"}, {}},
   };
   return all;
 }
@@ -63,10 +64,10 @@ Vec3 direction_of(const YAML::Node& node, const std::string& field) {
   return normal.normalized();
 }
 
-std::string label_name_of(const YAML::Node& node) {
-  if (!node.IsScalar() || node.Scalar().empty() || node.Scalar().size() > kLongestLabelName ||
+std::string edit_name_of(const YAML::Node& node) {
+  if (!node.IsScalar() || node.Scalar().empty() || node.Scalar().size() > kLongestEditName ||
       bounded_text(node.Scalar()) != node.Scalar())
-    throw YamlFault{"name is not one to " + std::to_string(kLongestLabelName) +
+    throw YamlFault{"name is not one to " + std::to_string(kLongestEditName) +
                     " bytes of plain text; write a short one, such as femur"};
   return node.Scalar();
 }
@@ -83,7 +84,7 @@ void set_field(LabelEdit& edit, const std::string& field, const YAML::Node& node
   else if (field == "points_mm")
     edit.points_mm = points_of(node, field);
   else if (field == "name")
-    edit.name = label_name_of(node);
+    edit.name = edit_name_of(node);
   else if (field == "opacity")
     edit.opacity = number_of(node, field, 0.0, 1.0);
   else if (field == "minutes")
@@ -126,8 +127,9 @@ void check_against(const std::vector<LabelEdit>& before, const LabelEdit& edit) 
     if (edit.kind == EditKind::box) throw YamlFault{"there is a box before it; remove one of them"};
     if (edit.kind == EditKind::label && other.bone == edit.bone)
       throw YamlFault{"bone " + std::to_string(edit.bone) + " has a label before it; remove one of them"};
-    if (edit.kind == EditKind::label && other.name == edit.name)
-      throw YamlFault{"name is " + quoted_value(edit.name) + ", as that of another label; write another"};
+    if ((edit.kind == EditKind::label || edit.kind == EditKind::landmark) && other.name == edit.name)
+      throw YamlFault{"name is " + quoted_value(edit.name) + ", as that of another " + std::string(name_of(edit.kind)) +
+                      "; write another"};
   }
 }
 

@@ -19,6 +19,7 @@ namespace osteon::import {
 //   outside   point_mm
 //   box       corner_mm, opposite_mm; once in the list
 //   label     bone, name, and opacity (0 to 1) and minutes; once for each bone
+//   landmark  name, point_mm; once for each name
 // Positions are [x, y, z] in mm, LPS, within 100 m; a radius is from 0.05 to 200 mm; a bone is a number from 1 to 254.
 // Errors: invalid_input. They name the file, the edit, the field and the remedy.
 [[nodiscard]] Result<std::vector<LabelEdit>> parse_edits(std::string_view text, const std::string& file_name);

@@ -127,8 +127,8 @@ class Replay {
 }  // namespace
 
 std::string_view name_of(EditKind kind) {
-  constexpr std::array<std::string_view, 8> kNames{"paint", "scribble", "erase", "cut",
-                                                   "seed",  "outside",  "box",   "label"};
+  constexpr std::array<std::string_view, 9> kNames{"paint",   "scribble", "erase", "cut",     "seed",
+                                                   "outside", "box",      "label", "landmark"};
   return kNames.at(static_cast<std::size_t>(kind));
 }
 
@@ -139,6 +139,8 @@ std::string edit_text(const LabelEdit& edit) {
            ", " + number_text(edit.minutes) + " min";
   if (edit.kind == EditKind::box)
     return text + " from " + point_text(edit.points_mm.front()) + " to " + point_text(edit.points_mm.back()) + " mm";
+  if (edit.kind == EditKind::landmark)
+    return text + " " + edit.name + " at " + point_text(edit.points_mm.front()) + " mm";
   if (edit.bone != 0) text += " bone " + std::to_string(edit.bone);
   if (edit.kind == EditKind::cut)
     text += edit.to_bone != 0 ? ", to bone " + std::to_string(edit.to_bone) : std::string(", removed");
@@ -190,6 +192,18 @@ Result<std::optional<imaging::VoxelBox>> boxed_voxels(const imaging::HuVolume& g
     return bad_edit(static_cast<std::size_t>(found - edits.begin()), *found,
                     "it holds no voxel of the scan; write two corners with voxels of the scan between them");
   return std::optional(box);
+}
+
+Result<void> check_landmarks(const imaging::HuVolume& grid, std::span<const LabelEdit> edits) {
+  constexpr double kAtMost = 0.5 + 1e-6;  // of a voxel from its centre
+  for (std::size_t i = 0; i < edits.size(); ++i) {
+    if (edits[i].kind != EditKind::landmark) continue;
+    const Vec3 at = grid.voxel(edits[i].points_mm.front());
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      if (const double c = at[static_cast<int>(axis)]; !(c >= -kAtMost && c <= grid.dims[axis] - 1.0 + kAtMost))
+        return bad_edit(i, edits[i], edits[i].name + " lies beside the scan; write a position in it");
+  }
+  return {};
 }
 
 Result<std::vector<EditEffect>> apply_edits(const imaging::HuVolume& grid, std::span<const LabelEdit> edits,

@@ -24,18 +24,20 @@ enum class EditKind {
   outside,  // a seed of what is no bone
   box,      // only the voxels between two opposite corners count, along the axes of the scan
   label,    // what a person says of `bone`
+  // The case takes these.
+  landmark,  // a named point
 };
 
 struct LabelEdit {
   EditKind kind = EditKind::paint;
   int bone = 0, to_bone = 0;
-  std::vector<Vec3> points_mm;  // centre, point of the plane, seed, or corners of the polyline or box; LPS
+  std::vector<Vec3> points_mm;  // centre, point of the plane, seed, landmark, or corners of the polyline or box; LPS
   double radius_mm = 0.0;
   // A unit vector. Of paint, scribble and erase, where zero is none: only voxels whose centre is less than half a voxel
   // from the plane through the first point count, so that a ball is a disc in one slice.
   Vec3 normal = Vec3::Zero();
+  std::string name = {};  // of a label or landmark
   // Of a label.
-  std::string name = {};
   double opacity = 1.0;  // 0 to 1, in pictures of slices
   double minutes = 0.0;  // of a person's work
 };
@@ -58,6 +60,9 @@ struct EditEffect {
 // is no such voxel).
 [[nodiscard]] Result<std::optional<imaging::VoxelBox>> boxed_voxels(const imaging::HuVolume& grid,
                                                                     std::span<const LabelEdit> edits);
+
+// Error: invalid_input (a landmark lies in no voxel of the scan; names it and the remedy).
+[[nodiscard]] Result<void> check_landmarks(const imaging::HuVolume& grid, std::span<const LabelEdit> edits);
 
 // Changes `labels`, which lie on the voxels of `grid`. A voxel belongs to a ball or a side if its centre does; the
 // surface of the ball and the plane itself belong to them. Errors: invalid_input (a ball or polyline without a voxel of

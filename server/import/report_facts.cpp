@@ -289,6 +289,11 @@ void add_steps(const ImportReport& report, ReportFacts& facts) {
     for (const std::string& edit : label.provenance.edits) facts.steps.push_back({"edit of " + label.name, edit, {}});
   }
   const CaseInfo& info = report.bone->info();
+  for (const Landmark& landmark : info.landmarks)
+    facts.steps.push_back(
+        {"landmark " + landmark.name,
+         "in the patient (LPS)",
+         {{"x_mm", landmark.point_mm.x()}, {"y_mm", landmark.point_mm.y()}, {"z_mm", landmark.point_mm.z()}}});
   facts.steps.push_back({"surface", "signed distances on cubes of this edge", {{"pitch_mm", info.pitch_mm}}});
   if (info.calibration != DensityCalibration{})
     facts.steps.push_back({"density",

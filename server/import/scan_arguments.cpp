@@ -228,6 +228,29 @@ void add_filter_options(CLI::App& command, FilterArguments& a) {
       ->check(number_in(0.0, 10.0));
 }
 
+void add_edge_options(CLI::App& command, EdgeArguments& a) {
+  command.add_option("--sigma", a.sigma_mm, "Of edges: smooth with a Gaussian of this sigma first, mm")
+      ->check(number_in(0.0, 10.0))
+      ->capture_default_str();
+  command
+      .add_option("--limits", a.limits,
+                  "LOW,HIGH of edges, HU/mm: a line begins at the higher gradient and goes on to the lower one")
+      ->capture_default_str();
+  command.add_option("--edges-in", a.space, "Find edges in each slice by itself, or in the whole volume")
+      ->check(CLI::IsMember({"slice", "volume"}))
+      ->capture_default_str();
+}
+
+Result<imaging::CannyParams> canny_params(const EdgeArguments& a) {
+  const auto limits = parse_pair(a.limits);
+  if (!limits || !(limits->first > 0.0) || !(limits->first <= limits->second))
+    return bad_input("--limits " + a.limits +
+                     " are not limits of a gradient; write the lower and the higher one in "
+                     "HU/mm, above 0, such as 100,300");
+  return imaging::CannyParams{a.sigma_mm, limits->first, limits->second,
+                              a.space == "slice" ? imaging::EdgeSpace::slice : imaging::EdgeSpace::volume};
+}
+
 std::optional<imaging::MedianBox> median_box(const FilterArguments& a) {
   if (a.median.empty()) return {};
   return a.median == "slice" ? imaging::MedianBox::slice : imaging::MedianBox::volume;

@@ -6,6 +6,7 @@
 #include <string_view>
 
 #include "common/core/keep_going.hpp"
+#include "common/imaging/edges.hpp"
 #include "common/imaging/smoothing.hpp"
 #include "server/import/ct_scan.hpp"
 
@@ -42,6 +43,15 @@ struct FilterArguments {
 };
 void add_filter_options(CLI::App& command, FilterArguments& arguments);
 [[nodiscard]] std::optional<imaging::MedianBox> median_box(const FilterArguments& arguments);
+
+// How edges are found, see imaging::canny_edges().
+struct EdgeArguments {
+  double sigma_mm = 1.0;
+  std::string space = "volume", limits = "100,300";
+};
+void add_edge_options(CLI::App& command, EdgeArguments& arguments);
+// Error: invalid_input (the limits).
+[[nodiscard]] Result<imaging::CannyParams> canny_params(const EdgeArguments& arguments);
 
 // What an input is that has one scan and no series; empty for others.
 [[nodiscard]] std::string_view name_of_one_scan(const std::string& input, const KeepGoing& keep_going);

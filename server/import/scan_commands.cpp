@@ -25,6 +25,7 @@ constexpr std::size_t kMostNumbered = 254;
 struct ShownScan {
   ScanArguments scan;
   FilterArguments filter;
+  EdgeArguments edge;
   std::string out, edits;
   double threshold_hu = CtOptions{}.threshold_hu;
 };
@@ -48,6 +49,22 @@ Result<std::string> run_export_scan(const ShownScan& a, const StopSignal& stop) 
     return tl::unexpected(written.error());
   bar.stage(1.0, 1.0)(1.0);
   return "scan       " + imaging::describe(scan->volume) + ", in " + a.out + "\n" + report_lines(scan->report);
+}
+
+Result<std::string> run_edges(const ShownScan& a, const StopSignal& stop) {
+  if (auto good = check_raw_file(a.out); !good) return tl::unexpected(good.error());
+  const auto params = canny_params(a.edge);
+  if (!params) return tl::unexpected(params.error());
+  Bar bar(stop, "finding");
+  auto scan = read_scan(a.scan, bar.stage(0.0, 0.3));
+  if (!scan) return tl::unexpected(scan.error());
+  const imaging::HuVolume grid = without_values(scan->volume);
+  const auto edges = imaging::canny_edges(std::move(scan->volume), *params, bar.stage(0.3, 0.9));
+  if (!edges) return tl::unexpected(edges.error());
+  if (auto written = write_raw_nrrd(grid, edges->values, a.out, bar.stage(0.9, 1.0)); !written)
+    return tl::unexpected(written.error());
+  bar.stage(1.0, 1.0)(1.0);
+  return "edges      " + std::to_string(std::ranges::count(edges->values, 1)) + " voxels, in " + a.out + "\n";
 }
 
 std::string islands_json(const CtSegmentation& found) {
@@ -119,6 +136,14 @@ void add_scan_commands(CLI::App& app, std::vector<Command>& commands) {
       ->capture_default_str();
   islands->add_option("--edits", found->edits, "YAML file of corrections, whose box limits the search");
   commands.push_back({islands, [found](const StopSignal& stop) { return run_islands(*found, stop); }});
+
+  const auto lines = std::make_shared<ShownScan>();
+  CLI::App* edges = app.add_subcommand("edges", "Find the edges of a scan after Canny, and write where they lie");
+  add_scan_options(*edges, lines->scan);
+  edges->add_option("FILE", lines->out, "File to write: .nrrd, with 1 for each voxel of an edge, and 0 elsewhere")
+      ->required();
+  add_edge_options(*edges, lines->edge);
+  commands.push_back({edges, [lines](const StopSignal& stop) { return run_edges(*lines, stop); }});
 }
 
 }  // namespace osteon::import

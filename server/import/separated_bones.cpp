@@ -25,7 +25,7 @@ std::string effect_text(const LabelEdit& edit, const EditEffect& effect, double 
     return static_cast<double>(std::accumulate(counts.begin() + 1, counts.end(), std::int64_t{0})) * voxel_cm3;
   };
   if (edit.kind == EditKind::seed || edit.kind == EditKind::outside || edit.kind == EditKind::box ||
-      edit.kind == EditKind::label)
+      edit.kind == EditKind::label || edit.kind == EditKind::landmark)
     return edit_text(edit);
   std::array<char, 64> text{};
   std::snprintf(text.data(), text.size(), ": %.3f cm3 added, %.3f cm3 taken", bone_cm3(effect.gained),

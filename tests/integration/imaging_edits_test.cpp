@@ -4,6 +4,7 @@
 
 #include <QCheckBox>
 #include <QComboBox>
+#include <QDesktopServices>
 #include <QDoubleSpinBox>
 #include <QLineEdit>
 #include <QListWidget>
@@ -11,12 +12,14 @@
 #include <QSlider>
 #include <QSpinBox>
 #include <QTest>
+#include <QTextBrowser>
 #include <QToolButton>
 #include <QWheelEvent>
 #include <algorithm>
 #include <filesystem>
 #include <sstream>
 #include <string>
+#include <vector>
 
 #include "common/volume/case.hpp"
 #include "tests/integration/imaging_bench.hpp"
@@ -150,6 +153,101 @@ TEST_F(ImagingEditsTest, FilterBoxAndBrushMakeTheBoneOfTheSameList) {
     EXPECT_NE(list.find(kind), std::string::npos) << list;
   // The painted rod sticks out of the ball. A sample of it, at a pitch of 0.9 mm: 14.4, -10.8 and 0.9 mm.
   EXPECT_EQ(made->bone_number({16, -12, 1}), 1);
+}
+
+// The pixel of a ball's middle, from the picture alone. Lines and letters over it do not move a median.
+QPoint middle_of_ball(ImagingPlane& axial, int side) {
+  const QImage seen = axial.grab().toImage();
+  std::vector<int> columns, rows;
+  for (int y = 0; y < seen.height(); ++y)
+    for (int x = 0; x < seen.width(); ++x) {
+      // The patient's left is to the right.
+      const QColor colour(seen.pixel(x, y));
+      if ((x > seen.width() / 2) != (side > 0) || colour.value() < 120) continue;
+      columns.push_back(x);
+      rows.push_back(y);
+    }
+  const auto middle = [](std::vector<int>& all) {
+    std::ranges::sort(all);
+    return all.at(all.size() / 2);
+  };
+  return {middle(columns), middle(rows)};
+}
+
+TEST_F(ImagingEditsTest, LandmarksAreInTheCaseWhereTheClicksWere) {
+  ImagingPlane& axial = plane("plane_axial");
+  const QPoint left = middle_of_ball(axial, 1), right = middle_of_ball(axial, -1);
+  click("tool_landmark");
+  auto& name = part<QComboBox>("landmark_name");
+  auto& list = part<QListWidget>("landmarks");
+  QTest::mouseClick(&axial, Qt::LeftButton, {}, left);
+  EXPECT_EQ(list.count(), 1);
+  name.setEditText("Right apex");
+  QTest::mouseClick(&axial, Qt::LeftButton, {}, left);
+  EXPECT_EQ(name.currentText(), "landmark 2");
+  // The chosen one moves, and gets another name.
+  list.setCurrentRow(1);
+  EXPECT_EQ(name.currentText(), "Right apex");
+  QTest::mouseClick(&axial, Qt::LeftButton, {}, right);
+  ASSERT_EQ(list.count(), 2);
+  list.item(0)->setText("Left apex");
+  ASSERT_TRUE(until([&] { return axial.slice() == 12 && list.item(0)->text() == "Left apex" && can_undo(); }));
+  QTest::qWait(20);
+  list.setCurrentRow(0);
+  QTest::mouseClick(&part<QPushButton>("landmark_remove"), Qt::LeftButton);
+  EXPECT_EQ(list.count(), 1);
+  click("undo_edit");
+  EXPECT_EQ(list.count(), 2);
+  click("tool_look");
+  double_click(axial, axial.pixel(ball(1)));
+  part<QCheckBox>("with_report").click();
+  QTextBrowser browser;
+  QDesktopServices::setUrlHandler("file", &browser, "setSource");
+  const auto made = made_twice();
+  QDesktopServices::unsetUrlHandler("file");
+  ASSERT_TRUE(made) << made.error().message;
+  const std::string list_name = edits_.filename().string();
+  const fs::path report = cases_folder() / (list_name.substr(0, list_name.find(".edits")) + ".report") / "report.html";
+  EXPECT_EQ(browser.source().toLocalFile().toStdString(), report.string());
+  EXPECT_NE(test::content(report).find("landmark Left apex"), std::string::npos);
+  ASSERT_EQ(made->info().landmarks.size(), 2u);
+  EXPECT_EQ(made->info().landmarks[0].name, "Left apex");
+  EXPECT_EQ(made->info().landmarks[1].name, "Right apex");
+  const Vec3 half = 0.5 * two_balls().spacing_mm + Vec3::Constant(0.2);  // and a pixel
+  for (const int side : {1, -1}) {
+    const Vec3 at = made->info().landmarks[side > 0 ? 0 : 1].point_mm;
+    // Slice 12 lies half a step above the middles.
+    const Vec3 middle(side * test::kApart_mm, 0.0, 0.5 * two_balls().spacing_mm.z());
+    EXPECT_TRUE(((at - middle).cwiseAbs().array() <= half.array()).all()) << at.transpose();
+  }
+}
+
+TEST_F(ImagingEditsTest, EdgesAreDrawnAndGoWithTheScan) {
+  ImagingPlane& axial = plane("plane_axial");
+  const std::array<int, 3> middle = ball(1);
+  const auto is_edge = [&](int beside) {
+    const QColor seen = colour(axial, {middle[0] + beside, middle[1] + 1, middle[2]});
+    return seen.blue() > 180 && seen.green() > 180 && seen.red() < 130;
+  };
+  // The surface is 8.9 voxels from the middle.
+  const auto on_surface = [&] { return is_edge(8) || is_edge(9); };
+  EXPECT_FALSE(on_surface());
+  auto& edges = part<QCheckBox>("edges");
+  edges.click();
+  ASSERT_TRUE(until([&] { return found(2); })) << words();
+  EXPECT_TRUE(edges.isChecked()) << words();
+  EXPECT_TRUE(on_surface());
+  EXPECT_FALSE(is_edge(5));
+  EXPECT_FALSE(is_edge(13));
+  edges.click();
+  EXPECT_FALSE(on_surface());
+  edges.click();
+  ASSERT_TRUE(until([&] { return found(2); })) << words();
+  auto& filter = part<QComboBox>("filter");
+  filter.setCurrentIndex(1);
+  emit filter.activated(1);
+  ASSERT_TRUE(until([&] { return found(2) && !edges.isChecked(); })) << words();
+  EXPECT_FALSE(on_surface()) << "they were of the scan before";
 }
 
 TEST_F(ImagingEditsTest, AFilterShowsInThePlanesAndIsUndone) {

@@ -2,6 +2,8 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -52,6 +54,30 @@ TEST_F(ScanCommands, AScanIsWrittenVoxelForVoxel) {
   refused({"export-scan", path("ct"), path("scan.nrrd")}, "scan.nrrd");
   refused({"export-scan", path("ct"), path("other.nii")}, ".nrrd");
   refused({"export-scan", path("ct"), path("other.nrrd"), "--series", "2"}, "series");
+}
+
+// Every edge is on the surface of a ball, and goes all around it.
+TEST_F(ScanCommands, EdgesLieOnTheSurfacesOfTheBalls) {
+  const auto written = start({"edges", path("ct"), path("edges.nrrd")});
+  ASSERT_EQ(written.exit_code, 0) << written.err;
+  const auto edges = read_number_file(folder_ / "edges.nrrd");
+  ASSERT_TRUE(edges) << edges.error().message;
+  EXPECT_EQ(edges->geometry.dims, balls_.dims);
+  std::array<int, 8> octants{};  // around the middle of the ball on the left
+  for (int k = 0; k < balls_.dims[2]; ++k)
+    for (int j = 0; j < balls_.dims[1]; ++j)
+      for (int i = 0; i < balls_.dims[0]; ++i) {
+        const int edge = edges->at({i, j, k});
+        ASSERT_LE(edge, 1);
+        if (edge == 0) continue;
+        const Vec3 at = balls_.position_mm(Vec3(i, j, k));
+        const Vec3 off = Vec3(std::abs(at.x()), at.y(), at.z()) - Vec3(kApart_mm, 0, 0);
+        EXPECT_NEAR(off.norm(), kBall_mm, balls_.spacing_mm.maxCoeff()) << at.transpose();
+        if (at.x() > 0.0) ++octants[(off.x() > 0) + 2 * (off.y() > 0) + 4 * (off.z() > 0)];
+      }
+  for (const int count : octants) EXPECT_GT(count, 10);
+  refused({"edges", path("ct"), path("other.nrrd"), "--limits", "300,100"}, "--limits");
+  refused({"edges", path("ct"), path("edges.nrrd")}, "edges.nrrd");
 }
 
 // Islands are the voxels of the balls, largest first; both have as many. What is listed is what is written.

@@ -94,13 +94,15 @@ ImagingSteps::Events ImagingPage::step_events() {
           [this](ShownScan scan, const HuHistogram& histogram) { show_scan(std::move(scan), histogram); },
           [this](ShownScan scan, const HuHistogram& histogram) { show_filtered(std::move(scan), histogram); },
           [this](std::vector<ListedIsland> list, IslandMap map) { show_islands(std::move(list), std::move(map)); },
+          [this](VoxelFile<std::uint8_t> edges) { show_edges(std::move(edges)); },
           [this](const std::filesystem::path& bone) {
             events_.busy(false);
-            end_work(tr("The bone is made."));
+            end_work(show_report(bone));
             events_.made(bone);
           },
           [this](const QString& sentence) {
             events_.busy(false);
+            if (scene_.look.edges.values.empty()) show_edges({});
             end_work(sentence.isEmpty() ? tr("Cancelled. Nothing was written.") : sentence);
             if (!wanted_source_.isEmpty()) return open_source(std::exchange(wanted_source_, {}));
             if (std::exchange(wants_islands_, false)) find_islands();
@@ -180,6 +182,8 @@ QWidget* ImagingPage::make_corner() {
   choice_ = new ImagingBoneChoice({[this](int bone, const QString& name) { name_bone(bone, name); },
                                    [this](int bone, int percent) { fade_bone(bone, percent); }});
   column->addWidget(choice_);
+  landmarks_ = make_landmarks();
+  column->addWidget(landmarks_);
   return corner;
 }
 
@@ -227,6 +231,8 @@ QBoxLayout* ImagingPage::make_side() {
   connect(threshold_, QOverload<int>::of(&QSpinBox::valueChanged), this, [this](int hu) { preview_threshold(hu); });
   form->addRow(tr("Threshold"), threshold_);
   add_filter(*form);
+  edges_ = make_edge_choice();
+  form->addRow(edges_);
   column->addLayout(form);
   histogram_ = new ImagingHistogram(
       {[this](int hu) { threshold_->setValue(hu); }, [this](const HuWindow& window) { change_window(window); }});
@@ -256,6 +262,8 @@ QBoxLayout* ImagingPage::make_side() {
     follow_edits();
   });
   redo_->setShortcut(QKeySequence::Redo);
+  report_ = make_report_choice();
+  column->addWidget(report_);
   make_ = add_button(*column, tr("&Make the bone"), "make_bone",
                      tr("Makes a case of the kept bones, and opens it to practise"), [this] { make_bone(); });
   return column;
@@ -289,10 +297,12 @@ void ImagingPage::open_source(const QString& source) {
   shown_filter_ = {};
   show_filter({});
   drag_.reset();
+  show_edges({});
   scene_.look = {};
   scene_.seeds.clear();
   tools_->reset();
   choice_->follow({});
+  landmarks_->follow({});
   island_list_->clear();
   readout_->clear();
   const QSignalBlocker quiet(threshold_);
@@ -350,6 +360,7 @@ void ImagingPage::show_scan(ShownScan scan, const HuHistogram& histogram) {
 }
 
 void ImagingPage::show_filtered(ShownScan scan, const HuHistogram& histogram) {
+  show_edges({});  // they were of the scan before
   scene_.scan = std::move(scan);
   shown_filter_ = searched_.filter;
   histogram_->set_histogram(histogram);
@@ -463,6 +474,9 @@ void ImagingPage::enable_parts() {
   set_enabled(*tools_, !making, wait);
   tools_->set_found(found, none);
   set_enabled(*choice_, found, none);
+  set_enabled(*landmarks_, !making, wait);
+  set_enabled(*report_, !making, wait);
+  set_enabled(*edges_, free && scene_.open(), wait);
   // After a search that was cancelled or failed.
   find_->setVisible(free && !changing && scene_.open() && !current());
   set_enabled(*keep_, found, none);

@@ -12,12 +12,14 @@
 #include <vector>
 
 #include "viewer_client/desktop/imaging_histogram.hpp"
+#include "viewer_client/desktop/imaging_landmarks.hpp"
 #include "viewer_client/desktop/imaging_plane.hpp"
 #include "viewer_client/desktop/imaging_steps.hpp"
 #include "viewer_client/desktop/imaging_tools.hpp"
 #include "viewer_client/imaging/edit_history.hpp"
 
 class QBoxLayout;
+class QCheckBox;
 class QComboBox;
 class QDoubleSpinBox;
 class QFormLayout;
@@ -98,6 +100,16 @@ class ImagingPage : public QWidget {
   void keep_outside(const std::array<int, 3>& voxel);
   void name_bone(int bone, const QString& name);
   void fade_bone(int bone, int percent);
+  [[nodiscard]] ImagingLandmarks* make_landmarks();
+  void set_landmark(const std::array<int, 3>& voxel);
+  void show_landmark(const std::string& name);
+  [[nodiscard]] QCheckBox* make_report_choice();
+  // Opens the report of a case, if it has one. What is said of the case.
+  [[nodiscard]] QString show_report(const std::filesystem::path& bone) const;
+  [[nodiscard]] QCheckBox* make_edge_choice();
+  // Finds the edges, or takes them away.
+  void choose_edges(bool on);
+  void show_edges(VoxelFile<std::uint8_t> edges);
   // Into the history, with the time since the last edit for a bone; 0: for none.
   void take(ImagingEdits edits, int bone);
   // The bones at a voxel: that of its paint, or all that grow in its island.
@@ -146,10 +158,12 @@ class ImagingPage : public QWidget {
   QProgressBar* progress_;
   QPushButton *cancel_, *back_, *find_, *keep_, *undo_, *redo_, *make_;
   QComboBox *preset_, *filter_;
+  QCheckBox *edges_, *report_;
   QSpinBox* threshold_;
   QDoubleSpinBox* gaussian_;
   ImagingTools* tools_ = nullptr;
   ImagingBoneChoice* choice_;
+  ImagingLandmarks* landmarks_;
   ImagingHistogram* histogram_;
   std::array<ImagingPlane*, 3> planes_{};
   QTimer threshold_timer_;  // the user has stopped to change the threshold

@@ -1,4 +1,5 @@
 // The edits of the page of image processing: threshold, filter, seeds, strokes, cuts, box and labels.
+#include <QCheckBox>
 #include <QComboBox>
 #include <QDoubleSpinBox>
 #include <QLabel>
@@ -156,7 +157,8 @@ bool ImagingPage::begin_drag(const PlaneAxes& axes, const std::array<int, 3>& vo
   end_drags(true);
   look_at(voxel);
   // A box without bone can be drawn anew.
-  if (scene_.tool == ImagingTool::box ? steps_.making() : !keep_->isEnabled()) {
+  const bool anywhere = scene_.tool == ImagingTool::box || scene_.tool == ImagingTool::landmark;
+  if (anywhere ? steps_.making() : !keep_->isEnabled()) {
     words_->setText(keep_->toolTip());
     return false;
   }
@@ -250,6 +252,8 @@ void ImagingPage::end_drag(bool keep) {
       return take(std::move(edits), 0);
     case ImagingTool::outside:
       return keep_outside(drag->first());
+    case ImagingTool::landmark:
+      return set_landmark(drag->last());
     default:
       return;
   }
@@ -281,6 +285,7 @@ void ImagingPage::follow_edits() {
   threshold_timer_.stop();
   show_filter(edits.filter);
   choice_->follow(edits);
+  landmarks_->follow(edits);
   if (!current()) {
     scene_.look.threshold_hu = edits.threshold_hu;
     refresh_look();
@@ -301,6 +306,10 @@ void ImagingPage::refresh_look() {
   look.kept = {};
   scene_.seeds.clear();
   for (std::size_t bone = 1; bone < look.bones.size(); ++bone) look.bones[bone] = tint_of(static_cast<int>(bone), true);
+  scene_.landmarks.clear();
+  for (const MarkedLandmark& landmark : edits.landmarks)
+    if (const auto voxel = scene_.open() ? voxel_of(scene_.scan.geometry, landmark.at_mm) : std::nullopt)
+      scene_.landmarks.push_back({*voxel, QString::fromStdString(landmark.name)});
   std::array<int, 256> first_bone{};  // of each island
   for (const KeptSeed& seed : edits.seeds) {
     const auto voxel = scene_.open() ? voxel_of(scene_.scan.geometry, seed.at_mm) : std::nullopt;
@@ -339,7 +348,7 @@ void ImagingPage::make_bone() {
         return words_->setText(tr("Seeds of two bones are in one voxel now. Choose a lower threshold, or undo one."));
     }
   show_work(tr("The bone is being made"));
-  steps_.make(made_edits(edits, std::move(seeds), scene_.scan.geometry));
+  steps_.make(made_edits(edits, std::move(seeds), scene_.scan.geometry), report_->isChecked());
   events_.busy(steps_.making());
   enable_parts();
 }

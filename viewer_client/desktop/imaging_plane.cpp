@@ -20,7 +20,8 @@ constexpr int kPlaneMargin_px = 4, kPage = 10;
 constexpr int kWheelStep = 120;  // of Qt, for one notch
 constexpr QColor kCrosshair{90, 230, 140, 170}, kLetter{250, 220, 120}, kBoxEdge{90, 200, 255}, kOutside{255, 60, 60};
 constexpr QColor kBrush{255, 255, 255, 200};
-constexpr double kSeedMark_px = 4.0;
+constexpr QColor kLandmark{255, 120, 230};
+constexpr double kSeedMark_px = 4.0, kLandmark_px = 4.0;
 
 const char* name_of(Plane plane) {
   return plane == Plane::axial ? "axial" : plane == Plane::coronal ? "coronal" : "sagittal";
@@ -104,6 +105,7 @@ void ImagingPlane::paintEvent(QPaintEvent* /*event*/) {
   painter.setRenderHint(QPainter::SmoothPixmapTransform);
   painter.drawImage(picture, image);
   paint_marks(painter, at);
+  paint_landmarks(painter, at);
   // Below the title, which may reach the middle.
   paint_edge_letters(painter, all.toRect().adjusted(0, painter.fontMetrics().height(), 0, 0),
                      letters_of(axes_, scene_.scan.geometry));
@@ -144,6 +146,18 @@ void ImagingPlane::paint_marks(QPainter& painter, const PlaneFrame& at) const {
   const double radius_px = scene_.brush_mm / axes_.right_mm * voxel_px;
   painter.setPen(kBrush);
   painter.drawEllipse(QPointF(*hovered_), radius_px, radius_px);
+}
+
+void ImagingPlane::paint_landmarks(QPainter& painter, const PlaneFrame& at) const {
+  painter.setPen(kLandmark);
+  for (const ImagingScene::LandmarkMark& mark : scene_.landmarks) {
+    const auto place = place_in(axes_, mark.voxel);
+    if (place[2] != slice()) continue;
+    const auto [x, y] = pixel_of(axes_, at, place[0], place[1]);
+    painter.drawLine(QPointF(x - kLandmark_px, y - kLandmark_px), QPointF(x + kLandmark_px, y + kLandmark_px));
+    painter.drawLine(QPointF(x - kLandmark_px, y + kLandmark_px), QPointF(x + kLandmark_px, y - kLandmark_px));
+    painter.drawText(QPointF(x + 2 * kLandmark_px, y - kLandmark_px), mark.name);
+  }
 }
 
 void ImagingPlane::begin_drag(const std::array<int, 3>& voxel) { dragging_ = events_.begin_drag(axes_, voxel); }

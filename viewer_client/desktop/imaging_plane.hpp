@@ -29,6 +29,11 @@ struct ImagingScene {
     bool outside = false;
   };
   std::vector<SeedMark> seeds;
+  struct LandmarkMark {
+    std::array<int, 3> voxel{};
+    QString name;
+  };
+  std::vector<LandmarkMark> landmarks;
 
   [[nodiscard]] bool open() const { return !scan.values.empty(); }
 };
@@ -87,6 +92,8 @@ class ImagingPlane : public QWidget {
   }
   // Crosshair, box, seeds and brush.
   void paint_marks(QPainter& painter, const PlaneFrame& at) const;
+  // Those in this slice, with their names.
+  void paint_landmarks(QPainter& painter, const PlaneFrame& at) const;
 
   Plane plane_;
   const ImagingScene& scene_;

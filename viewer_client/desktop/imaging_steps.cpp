@@ -19,6 +19,7 @@ namespace {
 constexpr const char* kVoxelFile = "scan.nrrd";
 constexpr const char* kFilteredFiles[] = {"filtered-1.nrrd", "filtered-2.nrrd"};
 constexpr const char* kIslandFile = "islands.nrrd";
+constexpr const char* kEdgeFile = "edges.nrrd";
 constexpr const char* kBoxFile = "box.edits.yaml";
 constexpr const char* kPictures = "pictures";
 // Files with one scan by the ends of their names. What is inside decides in osteon-import.
@@ -143,6 +144,7 @@ void ImagingSteps::in_background(std::function<void()> work, std::function<void(
     if (!cancelled_) return then();
     scan_ = ShownScan();
     islands_ = IslandMap();
+    edges_ = VoxelFile<std::uint8_t>();
     fail({});
   });
   loader_->start();
@@ -238,7 +240,20 @@ void ImagingSteps::read_islands(const QString& said, const ScanGeometry& scan) {
       });
 }
 
-void ImagingSteps::make(const ImagingEdits& edits) {
+void ImagingSteps::find_edges() {
+  cancelled_ = false;
+  QFile::remove(scratch_file(kEdgeFile));
+  start({"edges", scratch_file(shown_file_), scratch_file(kEdgeFile)}, [this](const QString&) {
+    in_background([this] { edges_ = read_number_file(scratch_ / kEdgeFile); },
+                  [this] {
+                    auto edges = std::exchange(edges_, VoxelFile<std::uint8_t>());
+                    if (!edges) return fail(QString::fromStdString(edges.error().message));
+                    events_.edges(std::move(*edges));
+                  });
+  });
+}
+
+void ImagingSteps::make(const ImagingEdits& edits, bool with_report) {
   cancelled_ = false;
   out_ = new_case_folder(source_);
   const QString file = text_of(edits_of(out_));
@@ -246,6 +261,7 @@ void ImagingSteps::make(const ImagingEdits& edits) {
   QStringList how{"ct", source_, "--threshold", QString::number(edits.threshold_hu, 'g', 17), "--edits", file};
   how << options_of(edits.filter);
   if (series_) how << "--series" << QString::number(*series_);
+  if (with_report) how << "--report" << text_of(report_folder(out_));
   maker_ = std::make_unique<CaseMaker>(how, out_,
                                        CaseMaker::Events{[this](int percent) { events_.progress(percent); },
                                                          [this](const std::filesystem::path& bone) {

@@ -39,6 +39,7 @@ class ImagingSteps : public QObject {
     std::function<void(const std::vector<ListedSeries>& series)> listed;
     std::function<void(ShownScan scan, const HuHistogram&histogram)> read, filtered;
     std::function<void(std::vector<ListedIsland> list, IslandMap map)> found;
+    std::function<void(VoxelFile<std::uint8_t> edges)> edges;
     std::function<void(const std::filesystem::path& bone)> made;
     std::function<void(const QString& sentence)> failed;  // empty: cancelled
   };
@@ -57,8 +58,10 @@ class ImagingSteps : public QObject {
   void filter(const ScanFilter& filter);
   // The islands of the filtered scan, by the edits' threshold and box.
   void find(const ScanGeometry& scan, const ImagingEdits& edits);
-  // The case has the edit list beside it, in a file NAME.edits.yaml.
-  void make(const ImagingEdits& edits);
+  // The edges of the filtered scan: tells `edges`.
+  void find_edges();
+  // The case has the edit list beside it, in a file NAME.edits.yaml. With a report it has that in report_folder(), too.
+  void make(const ImagingEdits& edits, bool with_report);
 
  private:
   void start(const QStringList& arguments, std::function<void(const QString& said)> done);
@@ -84,6 +87,7 @@ class ImagingSteps : public QObject {
   Result<ShownScan> scan_;
   HuHistogram histogram_;  // of the scan
   Result<IslandMap> islands_;
+  Result<VoxelFile<std::uint8_t>> edges_;
   std::unique_ptr<QThread> loader_;
 };
 

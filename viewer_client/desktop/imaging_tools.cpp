@@ -49,6 +49,8 @@ ImagingTools::ImagingTools(std::function<void()> changed, QWidget* parent)
        tr("Click on what is no bone and touches one. It is separated and left out."), "Ctrl+Alt+8"},
       {ImagingTool::box, tr("Box"), "tool_box",
        tr("Drag a rectangle on two planes. Only the box counts. A click takes it away."), "Ctrl+Alt+9"},
+      {ImagingTool::landmark, tr("Landmark"), "tool_landmark",
+       tr("Click where the landmark of the field Landmark is. The case keeps it."), "Ctrl+Alt+M"},
   };
   for (const Words& words : all) add_tool(*row, words);
   radius_ = new QDoubleSpinBox;
@@ -104,7 +106,8 @@ void ImagingTools::turn_radius(int notches) { radius_->setValue(radius_->value()
 void ImagingTools::set_found(bool found, const QString& reason) {
   for (QToolButton* button : buttons_) {
     const int tool = button->property("tool").toInt();
-    const bool always = tool == static_cast<int>(ImagingTool::look) || tool == static_cast<int>(ImagingTool::box);
+    const bool always = tool == static_cast<int>(ImagingTool::look) || tool == static_cast<int>(ImagingTool::box) ||
+                        tool == static_cast<int>(ImagingTool::landmark);
     set_enabled(*button, found || always, reason);
   }
 }

@@ -30,7 +30,7 @@ class ImagingTools : public QWidget {
   [[nodiscard]] bool flat() const;
   // A notch is a step of the radius.
   void turn_radius(int notches);
-  // Without parts of bone only the crosshair and the box work. `reason`: why there are none.
+  // Without parts of bone only the crosshair, the box and the landmark work. `reason`: why there are none.
   void set_found(bool found, const QString& reason);
   // As at the start.
   void reset();

@@ -81,14 +81,16 @@ std::filesystem::path new_case_folder(const QString& source) {
   QString name = QFileInfo(source).completeBaseName();
   if (name.isEmpty() || is_name_of_unpacked(name.toStdString())) name = "case";
   std::filesystem::path out = cases_folder() / name.toStdString();
-  // The edit list of a case that somebody removed may be all that is left of it.
+  // The edit list or the report of a case that somebody removed may be all that is left of it.
   const auto is_taken = [](const std::filesystem::path& bone) {
     return is_name_of_example(bone) || std::filesystem::exists(bone) ||
-           std::filesystem::exists(bone.string() + ".edits.yaml");
+           std::filesystem::exists(bone.string() + ".edits.yaml") || std::filesystem::exists(report_folder(bone));
   };
   for (int n = 2; is_taken(out); ++n) out = cases_folder() / (name.toStdString() + "-" + std::to_string(n));
   return out;
 }
+
+std::filesystem::path report_folder(const std::filesystem::path& bone) { return bone.string() + ".report"; }
 
 std::filesystem::path new_session_folder(const std::filesystem::path& bone) {
   const std::string day = QDateTime::currentDateTime().toString("yyyy-MM-dd-HHmmss").toStdString();

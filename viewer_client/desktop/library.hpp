@@ -42,9 +42,11 @@ void remember(const RecentEntry& entry);
 [[nodiscard]] std::filesystem::path data_folder();
 [[nodiscard]] std::filesystem::path cases_folder();                           // of the cases that the window has made
 [[nodiscard]] std::filesystem::path example_folder(const ExampleBone& bone);  // of its case
-// Of a case to import from a file or folder: its name, with a number if an example, a case or an edit list has it.
-// It is not made.
+// Of a case to import from a file or folder: its name, with a number if an example, a case, an edit list or a report
+// has it. It is not made.
 [[nodiscard]] std::filesystem::path new_case_folder(const QString& source);
+// Of the report of a case that was made with one: beside the case.
+[[nodiscard]] std::filesystem::path report_folder(const std::filesystem::path& bone);
 // Made at once, so that no other window takes the same one. If it cannot be made, it is not there.
 [[nodiscard]] std::filesystem::path new_session_folder(const std::filesystem::path& bone);
 // "unpack --into" names a folder so, by the SHA-256 of the file. An import never does.

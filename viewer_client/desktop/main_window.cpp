@@ -45,12 +45,12 @@
 #include "viewer_client/desktop/plan_bar.hpp"
 #include "viewer_client/desktop/properties_panel.hpp"
 #include "viewer_client/desktop/risk_gauge.hpp"
+#include "viewer_client/desktop/send_dialog.hpp"
 #include "viewer_client/desktop/slices_panel.hpp"
 #include "viewer_client/desktop/sound_control.hpp"
 #include "viewer_client/desktop/start_page.hpp"
 #include "viewer_client/desktop/tool_bar.hpp"
 #include "viewer_client/desktop/tool_names.hpp"
-#include "viewer_client/desktop/tour.hpp"
 #include "viewer_client/desktop/view_options.hpp"
 #include "viewer_client/scene/held_tools.hpp"
 
@@ -64,7 +64,6 @@ constexpr int kPointerPeriod_ms = 50;
 constexpr int kCapPeriod_ms = 16;
 constexpr int kMessage_ms = 8000;
 constexpr double kMostRiskLimit_mm = 50.0;
-constexpr int kFieldLetters = 40;  // most paths of files are seen as a whole
 constexpr const char* kFirstTool = "drill-3.2";
 
 // What changes the room, beside the tools.
@@ -276,36 +275,23 @@ void MainWindow::choose_room() {
   QDialog dialog(this);
   dialog.setWindowTitle(tr("Join a room"));
   auto* form = new QFormLayout(&dialog);
-  QSettings settings;
-  const auto field = [&](const QString& what, const char* key) {
-    auto* edit = new QLineEdit(settings.value(QString("join/") + key).toString());
-    edit->setObjectName(key);
-    edit->setMinimumWidth(kFieldLetters * edit->fontMetrics().averageCharWidth());
-    form->addRow(what, edit);
-    return edit;
-  };
-  QLineEdit* address = field(tr("Server, HOST:PORT"), "address");
-  QLineEdit* room = field(tr("Room (empty: the only one)"), "room");
-  QLineEdit* name = field(tr("Your name"), "name");
-  QLineEdit* certificates = field(tr("Folder of your certificate"), "certificates");
-  QLineEdit* ticket = field(tr("File of your ticket"), "ticket");
+  ServerFields fields(*form);
+  fields.add_address();
+  QLineEdit* room = fields.add(tr("Room (empty: the only one)"), "room");
+  QLineEdit* name = fields.add(tr("Your name"), "name");
+  fields.add_credentials();
   auto* buttons = new QDialogButtonBox(QDialogButtonBox::Ok | QDialogButtonBox::Cancel);
   form->addRow(buttons);
   connect(buttons, &QDialogButtonBox::accepted, &dialog, &QDialog::accept);
   connect(buttons, &QDialogButtonBox::rejected, &dialog, &QDialog::reject);
   if (dialog.exec() != QDialog::Accepted) return;
-  for (QLineEdit* edit : {address, room, name, certificates, ticket})
-    settings.setValue("join/" + edit->objectName(), edit->text());
-  wire::CredentialArguments arguments;
-  arguments.certificates = certificates->text().toStdString();
-  arguments.ticket = ticket->text().toStdString();
-  arguments.plain = certificates->text().isEmpty() && ticket->text().isEmpty();
-  const auto credentials = wire::client_credentials(arguments);
+  fields.remember();
+  const auto credentials = fields.credentials();
   if (!credentials) {
     QMessageBox::warning(this, "Osteon", QString::fromStdString(credentials.error().message));
     return;
   }
-  join({address->text(), room->text(), name->text(), *credentials});
+  join({fields.address(), room->text(), name->text(), *credentials});
 }
 
 void MainWindow::enable_opening(bool on) {

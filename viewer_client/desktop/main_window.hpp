@@ -11,12 +11,13 @@
 
 #include "common/input/pointer_link.hpp"
 #include "common/input/space_mouse.hpp"
-#include "common/wire/credentials.hpp"
 #include "viewer_client/desktop/inside_link.hpp"
 #include "viewer_client/desktop/library.hpp"
 #include "viewer_client/desktop/practice_room.hpp"
 #include "viewer_client/desktop/room_link.hpp"
+#include "viewer_client/desktop/server_fields.hpp"
 #include "viewer_client/desktop/stale_files.hpp"
+#include "viewer_client/desktop/tour.hpp"
 
 class QAction;
 class QKeySequence;
@@ -36,20 +37,13 @@ class PlanBar;
 class PropertiesPanel;
 class SoundControl;
 class RiskGauge;
+class SendDialog;
 class SlicesPanel;
 class StartPage;
 class SurgeryToolBar;
-class Tour;
 class ViewOptions;
-enum class TourStep : int;
 struct ConnectionState;
 struct CuttingState;
-
-// A room on a server that others run.
-struct RoomAddress {
-  QString address, room, name;
-  wire::ClientCredentials credentials;
-};
 
 class MainWindow : public QMainWindow {
   Q_DECLARE_TR_FUNCTIONS(MainWindow)
@@ -66,6 +60,9 @@ class MainWindow : public QMainWindow {
   // The case of the practice room as one file. Goes on in the background. A window that is closed meanwhile waits for
   // its end; closed once more, it leaves the file as it was.
   void save_case_file(const QString& file);
+  // Opens the dialog that sends a case to a server. `what`: the folder of a case, or a file with one. A dialog that is
+  // at work stays instead.
+  void send_case(const std::filesystem::path& what);
   void open_example(const ExampleBone& bone);
   void join(const RoomAddress& room);
   // Joins, but only to look: no tool can be taken, and nothing be placed or undone. The view follows the work.
@@ -117,8 +114,12 @@ class MainWindow : public QMainWindow {
   void make_imaging_page();
   void lay_out_page();
   void choose_scan();
+  // The folder or the file of a case; empty: none. `folder`: where the dialog begins.
+  [[nodiscard]] std::filesystem::path chosen_case(const QString& title, const QString& folder);
   void choose_case();
   void save_bone_as();
+  // The open bone, or else one that the user chooses.
+  void choose_case_to_send();
   void choose_room();
   void enter_room(const RoomAddress& room);
   void leave_room();
@@ -176,6 +177,7 @@ class MainWindow : public QMainWindow {
   std::unique_ptr<StaleFiles> stale_files_;  // outlives the programs below
   std::unique_ptr<CaseMaker> maker_;
   std::unique_ptr<ImporterRun> saver_, checker_;
+  std::unique_ptr<SendDialog> sender_;
   std::filesystem::path made_anew_;  // the case that make_anew() got last; empty: a room has opened since
   std::unique_ptr<PointerServer> pointer_;
   std::unique_ptr<PracticeRoom> practice_;

@@ -9,6 +9,7 @@
 
 #include "viewer_client/desktop/imaging_page.hpp"
 #include "viewer_client/desktop/main_window.hpp"
+#include "viewer_client/desktop/send_dialog.hpp"
 #include "viewer_client/desktop/start_page.hpp"
 #include "viewer_client/desktop/tool_bar.hpp"
 
@@ -140,14 +141,32 @@ void MainWindow::lay_out_page() {
   for (QDockWidget* panel : findChildren<QDockWidget*>()) panel->hide();
 }
 
-void MainWindow::choose_case() {
+std::filesystem::path MainWindow::chosen_case(const QString& title, const QString& folder) {
   // A file dialog chooses files only, so a folder is chosen by its case.json.
   const QString chosen =
-      QFileDialog::getOpenFileName(this, tr("Open a case"), {}, tr("Cases (*.osteon case.json);;All files (*)"));
-  if (chosen.isEmpty()) return;
+      QFileDialog::getOpenFileName(this, title, folder, tr("Cases (*.osteon case.json);;All files (*)"));
   const std::filesystem::path path = chosen.toStdString();
-  if (path.filename() != "case.json") return open_case_file(path);
-  practise(path.parent_path());
+  return path.filename() == "case.json" ? path.parent_path() : path;
+}
+
+void MainWindow::choose_case() {
+  const std::filesystem::path chosen = chosen_case(tr("Open a case"), {});
+  if (chosen.empty()) return;
+  is_file(chosen) ? open_case_file(chosen) : practise(chosen);
+}
+
+void MainWindow::choose_case_to_send() {
+  const std::filesystem::path chosen =
+      opened_ ? opened_->bone : chosen_case(tr("The case to send"), text_of(cases_folder()));
+  if (!chosen.empty()) send_case(chosen);
+}
+
+void MainWindow::send_case(const std::filesystem::path& what) {
+  if (!sender_ || !sender_->sending())
+    sender_ = std::make_unique<SendDialog>(what, is_file(what) ? text_of(what.filename()) : case_title(what), this);
+  sender_->show();
+  sender_->raise();
+  sender_->activateWindow();
 }
 
 void MainWindow::open_case_file(const std::filesystem::path& file) {

@@ -19,7 +19,6 @@
 #include "viewer_client/desktop/properties_panel.hpp"
 #include "viewer_client/desktop/sound_control.hpp"
 #include "viewer_client/desktop/tool_bar.hpp"
-#include "viewer_client/desktop/tour.hpp"
 #include "viewer_client/desktop/view_options.hpp"
 
 namespace osteon {
@@ -50,6 +49,9 @@ void MainWindow::make_file_menu() {
       file, tr("Save a &picture…"), "save_picture", QKeySequence::Save, [this] { save_picture(); }, true);
   add_action(
       file, tr("Save &bone as…"), "save_bone", QKeySequence("Ctrl+E"), [this] { save_bone_as(); }, true);
+  add_action(
+      file, tr("S&end a case to a server…"), "send_case", QKeySequence("Ctrl+U"), [this] { choose_case_to_send(); },
+      false);
   file->addSeparator();
   add_action(
       file, tr("&Quit"), "quit", QKeySequence::Quit, [this] { close(); }, false);

@@ -129,6 +129,8 @@ std::string edit_list_text(const ImagingEdits& edits) {
   for (const SharedCorrection& correction : edits.corrections)
     for (const SharedCorrection& part : parts_of(correction)) text += correction_text(*part);
   for (const BoneLabel& label : edits.labels) text += label_text(label);
+  for (const MarkedLandmark& landmark : edits.landmarks)
+    text += entry("landmark", "name: " + quoted(landmark.name) + ", point_mm: " + triple(landmark.at_mm));
   return text;
 }
 
@@ -136,6 +138,37 @@ bool is_listable(const ImagingEdits& edits) {
   const std::string text = edit_list_text(edits);
   const auto lines = static_cast<std::size_t>(std::ranges::count(text, '\n'));
   return text.size() <= kMostListBytes && lines <= kMostListedEdits + 2;  // a comment and the key come first
+}
+
+bool is_landmark_name(const std::string& name) {
+  return !name.empty() && name.size() <= kMostNameBytes && bounded_text(name) == name;
+}
+
+std::string next_landmark(const ImagingEdits& edits) {
+  for (int n = 1;; ++n)
+    if (std::string name = "landmark " + std::to_string(n);
+        std::ranges::find(edits.landmarks, name, &MarkedLandmark::name) == edits.landmarks.end())
+      return name;
+}
+
+void put_landmark(ImagingEdits& edits, const std::string& name, const Vec3& at_mm) {
+  const auto found = std::ranges::find(edits.landmarks, name, &MarkedLandmark::name);
+  if (found == edits.landmarks.end())
+    edits.landmarks.push_back({name, at_mm});
+  else
+    found->at_mm = at_mm;
+}
+
+bool rename_landmark(ImagingEdits& edits, const std::string& name, const std::string& other) {
+  const auto found = std::ranges::find(edits.landmarks, name, &MarkedLandmark::name);
+  if (found == edits.landmarks.end() || !is_landmark_name(other)) return false;
+  if (std::ranges::find(edits.landmarks, other, &MarkedLandmark::name) != edits.landmarks.end()) return false;
+  found->name = other;
+  return true;
+}
+
+void remove_landmark(ImagingEdits& edits, const std::string& name) {
+  std::erase_if(edits.landmarks, [&](const MarkedLandmark& landmark) { return landmark.name == name; });
 }
 
 bool may_be_called(const ImagingEdits& edits, int bone, const std::string& name) {

@@ -55,6 +55,13 @@ struct BoneLabel {
   friend bool operator==(const BoneLabel&, const BoneLabel&) = default;
 };
 
+// A named point of the case.
+struct MarkedLandmark {
+  std::string name;
+  Vec3 at_mm = Vec3::Zero();
+  friend bool operator==(const MarkedLandmark&, const MarkedLandmark&) = default;
+};
+
 struct ImagingEdits {
   double threshold_hu = 226.0;  // the same default as that of osteon-import
   ScanFilter filter;
@@ -62,6 +69,7 @@ struct ImagingEdits {
   std::vector<KeptSeed> seeds;
   std::vector<SharedCorrection> corrections;  // in their order
   std::vector<BoneLabel> labels;              // one for a bone at most
+  std::vector<MarkedLandmark> landmarks;      // one of each name
   friend bool operator==(const ImagingEdits&, const ImagingEdits&) = default;
 };
 
@@ -76,6 +84,17 @@ inline constexpr int kMostBones = 254;  // in an edit list
 [[nodiscard]] const BoneLabel* label_of(const ImagingEdits& edits, int bone);
 // The label of a bone, which gets one with the name "bone N" if it has none.
 [[nodiscard]] BoneLabel& own_label(ImagingEdits& edits, int bone);
+
+// Whether osteon-import takes the name for a landmark: plain text of 1 to 60 bytes.
+[[nodiscard]] bool is_landmark_name(const std::string& name);
+// "landmark N" with the lowest N that no landmark has.
+[[nodiscard]] std::string next_landmark(const ImagingEdits& edits);
+// Puts the landmark of this name at a place. Without one of the name it is a new one.
+void put_landmark(ImagingEdits& edits, const std::string& name, const Vec3& at_mm);
+// Gives a landmark another name. False, and nothing changes: there is none of the first name, or one of the other, or
+// the other is no name of a landmark.
+[[nodiscard]] bool rename_landmark(ImagingEdits& edits, const std::string& name, const std::string& other);
+void remove_landmark(ImagingEdits& edits, const std::string& name);
 
 // The options of "osteon-import ct" and "export-scan" for a filter.
 [[nodiscard]] std::vector<std::string> filter_options(const ScanFilter& filter);

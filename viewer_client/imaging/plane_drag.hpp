@@ -11,7 +11,7 @@
 namespace osteon {
 
 // What the left button does on a plane.
-enum class ImagingTool : std::uint8_t { look, paint, erase, cut, box, outside };
+enum class ImagingTool : std::uint8_t { look, paint, erase, cut, box, outside, landmark };
 
 class PlaneDrag {
  public:

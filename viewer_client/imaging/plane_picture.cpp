@@ -46,7 +46,9 @@ std::vector<std::uint32_t> draw_plane(const ShownScan& scan, const IslandMap& is
       const std::uint8_t island = islands.number(voxel);
       const std::uint8_t mark = corrected.empty() ? std::uint8_t{0} : corrected[pixels.size()];
       const bool above = look.threshold_hu && hu >= *look.threshold_hu && range.contains(voxel);
-      pixels.push_back(tinted(greys[hu], mark == kErased                     ? kErasedTint
+      const bool edge = !look.edges.values.empty() && look.edges.at(voxel) != 0;
+      pixels.push_back(tinted(greys[hu], edge                                ? kEdgeTint
+                                         : mark == kErased                   ? kErasedTint
                                          : mark != 0                         ? look.bones[mark]
                                          : island != 0 && !look.threshold_hu ? look.islands[island]
                                          : above                             ? kThresholdTint

@@ -18,7 +18,7 @@ struct Tint {
 };
 // A colour for an island. Neighbours in the list differ. One that is left out is pale.
 [[nodiscard]] Tint tint_of(int island, bool kept);
-inline constexpr Tint kThresholdTint{255, 200, 40, 110}, kErasedTint{235, 40, 40, 120};
+inline constexpr Tint kThresholdTint{255, 200, 40, 110}, kErasedTint{235, 40, 40, 120}, kEdgeTint{60, 255, 255, 200};
 
 struct PlaneLook {
   HuWindow window;
@@ -28,6 +28,8 @@ struct PlaneLook {
   BonesOfIslands kept{};
   std::vector<SharedCorrection> corrections;
   std::optional<MarkedBox> box;  // the threshold tints nothing beside it
+  // 1: a voxel of an edge, tinted over all else. Of the same grid as the scan; empty: none are shown.
+  VoxelFile<std::uint8_t> edges = {};
 };
 
 // One pixel for each voxel, 0xffRRGGBB, rows from the top. With a threshold the islands, which are of another one, are

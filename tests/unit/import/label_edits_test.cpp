@@ -299,10 +299,13 @@ TEST(EditFile, FaultsAreOneSentenceWithFileEditFieldAndRemedy) {
 TEST(EditFile, WhatMayBeThereOnceIsRefusedTheSecondTime) {
   const std::string box = "  - {kind: box, corner_mm: [0, 0, 0], opposite_mm: [1, 1, 1]}\n";
   const std::string femur = "  - {kind: label, bone: 1, name: femur}\n";
+  const std::string landmark = "  - {kind: landmark, name: femur, point_mm: [1, 2, 3]}\n";
+  EXPECT_EQ(edits_of(femur + landmark).size(), 2u) << "a bone and a point may have one name";
   for (const auto& [list, what] :
        {std::pair<std::string, std::string>{box + box, "there is a box before it; "},
         {femur + "  - {kind: label, bone: 1, name: tibia}\n", "bone 1 has a label before it; "},
-        {femur + "  - {kind: label, bone: 2, name: femur}\n", "name is \"femur\", as that of another label; "}}) {
+        {femur + "  - {kind: label, bone: 2, name: femur}\n", "name is \"femur\", as that of another label; "},
+        {landmark + landmark, "name is \"femur\", as that of another landmark; "}}) {
     const auto refused = parse_edits("edits:\n" + list, "my-edits.yaml");
     ASSERT_FALSE(refused) << list;
     expect_one_sentence(refused.error(), "my-edits.yaml, line 3, edit 2: " + what);
@@ -347,6 +350,35 @@ TEST(EditFile, ReadsWhatIsNoCorrection) {
   const LabelEdit longest{
       .kind = EditKind::label, .bone = 254, .name = std::string(60, 'x'), .opacity = 1.0 / 3.0, .minutes = 1e5 / 3.0};
   EXPECT_LT(edit_text(longest).size(), 200u);
+}
+
+TEST(LabelEdits, ALandmarkLiesInAVoxelOfTheScan) {
+  const imaging::HuVolume grid = turned_grid();
+  const auto check = [&](const Vec3& voxel) {
+    const std::vector<LabelEdit> edits{
+        {.kind = EditKind::seed, .points_mm = {Vec3::Constant(1e4)}},
+        {.kind = EditKind::landmark, .points_mm = {grid.position_mm(voxel)}, .name = "apex"}};
+    return check_landmarks(grid, edits);
+  };
+  for (const Vec3& inside : {Vec3(0, 0, 0), Vec3(-0.49, 59.49, 20), Vec3(63.49, 30, -0.49), Vec3(63, 59, 39.49)})
+    EXPECT_TRUE(check(inside)) << inside.transpose();
+  for (const Vec3& beside : {Vec3(-0.51, 0, 0), Vec3(0, 59.51, 0), Vec3(0, 0, 39.51), Vec3(1e3, 1e3, 1e3)}) {
+    const auto refused = check(beside);
+    ASSERT_FALSE(refused) << beside.transpose();
+    expect_one_sentence(refused.error(), "edit 2 (landmark): apex lies beside the scan; ");
+  }
+}
+
+TEST(EditFile, ReadsLandmarks) {
+  const auto edits = edits_of(
+      "  - {kind: landmark, name: \"Épine \\\"1\\\"\", point_mm: [1.25, -2, 3e1]}\n"
+      "  - {kind: landmark, name: apex, point_mm: [4, 5, 6]}\n");
+  ASSERT_EQ(edits.size(), 2u);
+  EXPECT_EQ(edits[0].kind, EditKind::landmark);
+  EXPECT_EQ(edits[0].name, "Épine \"1\"");
+  EXPECT_EQ(edits[0].points_mm, (std::vector<Vec3>{{1.25, -2.0, 30.0}}));
+  EXPECT_EQ(edits[0].bone, 0);
+  EXPECT_EQ(edit_text(edits[1]), "landmark apex at 4,5,6 mm");
 }
 
 TEST(EditFile, EachEditIsALineForTheProvenance) {

@@ -246,6 +246,37 @@
     </message>
 </context>
 <context>
+    <name>CaseSending</name>
+    <message>
+        <source>Cancelled. The server keeps nothing, and the case here stays.</source>
+        <translation>Abgebrochen. Der Server behält nichts, und der Fall hier bleibt.</translation>
+    </message>
+    <message>
+        <source>Cannot make the folder %1. Choose a place where you may write.</source>
+        <translation>Der Ordner %1 kann nicht angelegt werden. Wählen Sie einen beschreibbaren Ort.</translation>
+    </message>
+    <message>
+        <source>%1 had the case already.</source>
+        <translation>%1 hatte den Fall schon.</translation>
+    </message>
+    <message>
+        <source>%1 has the case now.</source>
+        <translation>%1 hat den Fall nun.</translation>
+    </message>
+    <message>
+        <source>%1 has the case, and the room %2 is open with it.</source>
+        <translation>%1 hat den Fall, und der Raum %2 ist damit offen.</translation>
+    </message>
+    <message>
+        <source>Cancelled. %1 has the case already.</source>
+        <translation>Abgebrochen. %1 hat den Fall schon.</translation>
+    </message>
+    <message>
+        <source>%1 has the case, but did not open the room: %2</source>
+        <translation>%1 hat den Fall, aber der Raum wurde nicht geöffnet: %2</translation>
+    </message>
+</context>
+<context>
     <name>ChildProcess</name>
     <message>
         <source>The disk with %1 is full; make room on the disk.</source>
@@ -670,6 +701,81 @@
     </message>
 </context>
 <context>
+    <name>ImagingLandmarks</name>
+    <message>
+        <source>Name of the next landmark</source>
+        <translation>Name der nächsten Landmarke</translation>
+    </message>
+    <message>
+        <source>Name of the landmark that the next click with Landmark sets. One that is there moves.</source>
+        <translation>Name der Landmarke, die der nächste Klick mit Landmarke setzt oder verschiebt</translation>
+    </message>
+    <message>
+        <source>Centre of the femoral head</source>
+        <translation>Hüftkopfmitte</translation>
+    </message>
+    <message>
+        <source>Greater trochanter</source>
+        <translation>Großer Rollhügel</translation>
+    </message>
+    <message>
+        <source>Medial epicondyle</source>
+        <translation>Innerer Epikondylus</translation>
+    </message>
+    <message>
+        <source>Lateral epicondyle</source>
+        <translation>Äußerer Epikondylus</translation>
+    </message>
+    <message>
+        <source>Tibial tuberosity</source>
+        <translation>Schienbeinrauigkeit</translation>
+    </message>
+    <message>
+        <source>Medial malleolus</source>
+        <translation>Innenknöchel</translation>
+    </message>
+    <message>
+        <source>Lateral malleolus</source>
+        <translation>Außenknöchel</translation>
+    </message>
+    <message>
+        <source>Anterior superior iliac spine</source>
+        <translation>Vorderer oberer Darmbeinstachel</translation>
+    </message>
+    <message>
+        <source>Pubic tubercle</source>
+        <translation>Schambeinhöcker</translation>
+    </message>
+    <message>
+        <source>Landmark</source>
+        <translation>Landmarke</translation>
+    </message>
+    <message>
+        <source>Landmarks</source>
+        <translation>Landmarken</translation>
+    </message>
+    <message>
+        <source>A click shows one, and the next click with Landmark moves it. F2 renames it.</source>
+        <translation>Ein Klick zeigt eine, der nächste mit Landmarke verschiebt sie. F2 benennt um.</translation>
+    </message>
+    <message>
+        <source>Remove</source>
+        <translation>Entfernen</translation>
+    </message>
+    <message>
+        <source>Removes the landmark that is chosen in the list, also with Del</source>
+        <translation>Entfernt die in der Liste gewählte Landmarke, auch mit Entf</translation>
+    </message>
+    <message>
+        <source>Choose a landmark in the list first.</source>
+        <translation>Wählen Sie zuerst eine Landmarke in der Liste.</translation>
+    </message>
+    <message>
+        <source>%1, %2, %3 mm</source>
+        <translation>Bei %1, %2, %3 mm</translation>
+    </message>
+</context>
+<context>
     <name>ImagingPage</name>
     <message>
         <source>table or headrest</source>
@@ -967,6 +1073,46 @@
         <source>Smoothing</source>
         <translation>Glättung</translation>
     </message>
+    <message>
+        <source>No landmark can be called that. Write up to 60 bytes that no other landmark has.</source>
+        <translation>So kann keine Landmarke heißen. Der Name hat bis 60 Byte und gehört keiner anderen.</translation>
+    </message>
+    <message>
+        <source>Name the landmark first: up to 60 bytes, in the field Landmark.</source>
+        <translation>Benennen Sie zuerst die Landmarke: bis 60 Byte, im Feld Landmarke.</translation>
+    </message>
+    <message>
+        <source>%1 is at %2, %3, %4 mm.</source>
+        <translation>%1 liegt bei %2, %3, %4 mm.</translation>
+    </message>
+    <message>
+        <source>A page with pictures and numbers of the bone, beside the case; it opens at the end</source>
+        <translation>Seite mit Bildern und Zahlen des Knochens, neben dem Fall; sie öffnet sich</translation>
+    </message>
+    <message>
+        <source>The bone is made. Its report is in %1.</source>
+        <translation>Der Knochen ist erzeugt. Sein Bericht ist %1.</translation>
+    </message>
+    <message>
+        <source>Ed&amp;ges</source>
+        <translation>Kan&amp;ten</translation>
+    </message>
+    <message>
+        <source>Lines where the HU change most, after Canny</source>
+        <translation>Linien, wo sich die HU am meisten ändern, nach Canny</translation>
+    </message>
+    <message>
+        <source>Finding the edges</source>
+        <translation>Die Kanten werden gesucht</translation>
+    </message>
+    <message>
+        <source>The edges of the scan are shown.</source>
+        <translation>Die Kanten des Scans sind zu sehen.</translation>
+    </message>
+    <message>
+        <source>With a rep&amp;ort</source>
+        <translation>Mit Beri&amp;cht</translation>
+    </message>
 </context>
 <context>
     <name>ImagingPlane</name>
@@ -1095,6 +1241,14 @@
     <message>
         <source>Choose the brush first: Paint or Erase.</source>
         <translation>Wählen Sie zuerst den Pinsel: Malen oder Radieren.</translation>
+    </message>
+    <message>
+        <source>Landmark</source>
+        <translation>Landmarke</translation>
+    </message>
+    <message>
+        <source>Click where the landmark of the field Landmark is. The case keeps it.</source>
+        <translation>Klicken Sie, wo die Landmarke des Feldes liegt. Der Fall behält sie.</translation>
     </message>
 </context>
 <context>
@@ -1325,24 +1479,12 @@
         <translation>Einem Raum beitreten</translation>
     </message>
     <message>
-        <source>Server, HOST:PORT</source>
-        <translation>Server, HOST:PORT</translation>
-    </message>
-    <message>
         <source>Room (empty: the only one)</source>
         <translation>Raum (leer: der einzige)</translation>
     </message>
     <message>
         <source>Your name</source>
         <translation>Ihr Name</translation>
-    </message>
-    <message>
-        <source>Folder of your certificate</source>
-        <translation>Ordner Ihres Zertifikats</translation>
-    </message>
-    <message>
-        <source>File of your ticket</source>
-        <translation>Datei Ihres Tickets</translation>
     </message>
     <message>
         <source>%1 – Osteon</source>
@@ -1728,6 +1870,61 @@
         <source>&amp;Plan</source>
         <translation>&amp;Planung</translation>
     </message>
+    <message>
+        <source>The case to send</source>
+        <translation>Der Fall zum Senden</translation>
+    </message>
+    <message>
+        <source>S&amp;end a case to a server…</source>
+        <translation>Fall an Server s&amp;enden…</translation>
+    </message>
+</context>
+<context>
+    <name>OthersShots</name>
+    <message>
+        <source>Shots of the others in the room</source>
+        <translation>Aufnahmen der anderen im Raum</translation>
+    </message>
+    <message>
+        <source>Of a person the newest picture is shown, of a line below it that press.</source>
+        <translation>Von einer Person erscheint das neueste Bild, von einer Zeile darunter dieser Druck.</translation>
+    </message>
+    <message>
+        <source>The picture is made again from the bone and the tools as they are when you choose it.</source>
+        <translation>Das Bild wird aus Knochen und Werkzeugen neu berechnet, wie sie bei der Auswahl sind.</translation>
+    </message>
+    <message>
+        <source>Pictures of</source>
+        <translation>Bilder von</translation>
+    </message>
+    <message>
+        <source>Shots</source>
+        <translation>Aufnahmen</translation>
+    </message>
+    <message>
+        <source>Exposure, seconds</source>
+        <translation>Strahlzeit in Sekunden</translation>
+    </message>
+    <message>
+        <source>Dose-area product, nominal</source>
+        <translation>Dosisflächenprodukt, nominal</translation>
+    </message>
+    <message>
+        <source>Mine</source>
+        <translation>Mir</translation>
+    </message>
+    <message>
+        <source>Shot %1, %2</source>
+        <translation>Aufnahme %1, %2</translation>
+    </message>
+    <message>
+        <source>Shots %1 to %2, %3</source>
+        <translation>Aufnahmen %1 bis %2, %3</translation>
+    </message>
+    <message>
+        <source>%1, shot %2</source>
+        <translation>%1, Aufnahme %2</translation>
+    </message>
 </context>
 <context>
     <name>PlanBar</name>
@@ -1922,53 +2119,6 @@
     <message>
         <source>Rename…</source>
         <translation>Umbenennen…</translation>
-    </message>
-</context>
-<context>
-    <name>OthersShots</name>
-    <message>
-        <source>Shots of the others in the room</source>
-        <translation>Aufnahmen der anderen im Raum</translation>
-    </message>
-    <message>
-        <source>Of a person the newest picture is shown, of a line below it that press.</source>
-        <translation>Von einer Person erscheint das neueste Bild, von einer Zeile darunter dieser Druck.</translation>
-    </message>
-    <message>
-        <source>The picture is made again from the bone and the tools as they are when you choose it.</source>
-        <translation>Das Bild wird aus Knochen und Werkzeugen neu berechnet, wie sie bei der Auswahl sind.</translation>
-    </message>
-    <message>
-        <source>Pictures of</source>
-        <translation>Bilder von</translation>
-    </message>
-    <message>
-        <source>Shots</source>
-        <translation>Aufnahmen</translation>
-    </message>
-    <message>
-        <source>Exposure, seconds</source>
-        <translation>Strahlzeit in Sekunden</translation>
-    </message>
-    <message>
-        <source>Dose-area product, nominal</source>
-        <translation>Dosisflächenprodukt, nominal</translation>
-    </message>
-    <message>
-        <source>Mine</source>
-        <translation>Mir</translation>
-    </message>
-    <message>
-        <source>Shot %1, %2</source>
-        <translation>Aufnahme %1, %2</translation>
-    </message>
-    <message>
-        <source>Shots %1 to %2, %3</source>
-        <translation>Aufnahmen %1 bis %2, %3</translation>
-    </message>
-    <message>
-        <source>%1, shot %2</source>
-        <translation>%1, Aufnahme %2</translation>
     </message>
 </context>
 <context>
@@ -2177,6 +2327,84 @@
     <message>
         <source>%1 N</source>
         <translation>%1 N</translation>
+    </message>
+</context>
+<context>
+    <name>SendDialog</name>
+    <message>
+        <source>Send %1 to a server</source>
+        <translation>%1 an einen Server senden</translation>
+    </message>
+    <message>
+        <source>Room to open with it (empty: none)</source>
+        <translation>Raum, der damit aufgeht (leer: keiner)</translation>
+    </message>
+    <message>
+        <source>Progress</source>
+        <translation>Fortschritt</translation>
+    </message>
+    <message>
+        <source>&amp;Send</source>
+        <translation>&amp;Senden</translation>
+    </message>
+    <message>
+        <source>Sends the case. The one on this computer stays as it is.</source>
+        <translation>Sendet den Fall. Der auf diesem Rechner bleibt, wie er ist.</translation>
+    </message>
+    <message>
+        <source>The server checks the case and keeps it. Whoever may open rooms there can send it.</source>
+        <translation>Der Server prüft und behält den Fall. Senden kann, wer dort Räume öffnen darf.</translation>
+    </message>
+    <message>
+        <source>Cancelling…</source>
+        <translation>Wird abgebrochen…</translation>
+    </message>
+    <message>
+        <source>The case is being packed</source>
+        <translation>Der Fall wird gepackt</translation>
+    </message>
+    <message>
+        <source>Connecting to %1</source>
+        <translation>Verbindung zu %1</translation>
+    </message>
+    <message>
+        <source>The case is being sent</source>
+        <translation>Der Fall wird gesendet</translation>
+    </message>
+    <message>
+        <source>The server checks the case</source>
+        <translation>Der Server prüft den Fall</translation>
+    </message>
+    <message>
+        <source>The server opens the room</source>
+        <translation>Der Server öffnet den Raum</translation>
+    </message>
+    <message>
+        <source>The case is being sent. Wait for it, or cancel it.</source>
+        <translation>Der Fall wird gesendet. Warten Sie, oder brechen Sie ab.</translation>
+    </message>
+    <message>
+        <source>Cancel</source>
+        <translation>Abbrechen</translation>
+    </message>
+    <message>
+        <source>&amp;Close</source>
+        <translation>S&amp;chließen</translation>
+    </message>
+</context>
+<context>
+    <name>ServerFields</name>
+    <message>
+        <source>Folder of your certificate</source>
+        <translation>Ordner Ihres Zertifikats</translation>
+    </message>
+    <message>
+        <source>File of your ticket</source>
+        <translation>Datei Ihres Tickets</translation>
+    </message>
+    <message>
+        <source>Server, HOST:PORT</source>
+        <translation>Server, HOST:PORT</translation>
     </message>
 </context>
 <context>

@@ -62,6 +62,39 @@ TEST(ImagingEdits, EachKindIsThatOfTheImporter) {
   EXPECT_EQ(read[6].minutes, 12.35) << "hundredths";
 }
 
+TEST(ImagingEdits, LandmarksAreThoseOfTheImporter) {
+  ImagingEdits edits;
+  EXPECT_EQ(next_landmark(edits), "landmark 1");
+  put_landmark(edits, "landmark 1", {1, 2, 3});
+  put_landmark(edits, "tip \"of\" \\ nail: 1", {1.0 / 3.0, -20.1, 1e-3});
+  EXPECT_EQ(next_landmark(edits), "landmark 2");
+  put_landmark(edits, "landmark 1", {7, 8, 9});  // moves
+  const auto read = read_again(edits);
+  ASSERT_EQ(read.size(), 2u);
+  for (std::size_t i = 0; i < read.size(); ++i) {
+    EXPECT_EQ(read[i].kind, EditKind::landmark);
+    EXPECT_EQ(read[i].name, edits.landmarks[i].name);
+    EXPECT_EQ(read[i].points_mm, std::vector<Vec3>{edits.landmarks[i].at_mm});
+  }
+  EXPECT_EQ(read[0].points_mm.front(), Vec3(7, 8, 9));
+}
+
+TEST(ImagingEdits, LandmarksAreRenamedAndRemoved) {
+  ImagingEdits edits;
+  put_landmark(edits, "a", {1, 2, 3});
+  put_landmark(edits, "b", {4, 5, 6});
+  EXPECT_FALSE(rename_landmark(edits, "a", "b"));
+  EXPECT_FALSE(rename_landmark(edits, "c", "d"));
+  EXPECT_FALSE(rename_landmark(edits, "a", ""));
+  EXPECT_FALSE(rename_landmark(edits, "a", std::string(61, 'x')));
+  EXPECT_TRUE(rename_landmark(edits, "a", "c"));
+  ASSERT_EQ(edits.landmarks.size(), 2u);
+  EXPECT_EQ(edits.landmarks[0], (MarkedLandmark{"c", {1, 2, 3}}));
+  remove_landmark(edits, "c");
+  ASSERT_EQ(edits.landmarks.size(), 1u);
+  EXPECT_EQ(edits.landmarks[0].name, "b");
+}
+
 TEST(ImagingEdits, TheFirstLineIsTheCommand) {
   ImagingEdits edits;
   edits.threshold_hu = 300.0;

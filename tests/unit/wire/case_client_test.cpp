@@ -1,0 +1,176 @@
+// Sending a case, against a server that keeps the bytes, refuses, waits or ends.
+#include "common/wire/case_client.hpp"
+
+#include <grpcpp/grpcpp.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <fstream>
+#include <memory>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "osteon/v1/cases.grpc.pb.h"
+#include "osteon/v1/rooms.grpc.pb.h"
+#include "tests/support/temp_dir.hpp"
+
+namespace osteon::wire {
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr std::size_t kArchiveBytes = 3'000'001;
+
+class FakeCases final : public v1::CaseService::Service {
+ public:
+  grpc::Status UploadCase(grpc::ServerContext* context, grpc::ServerReader<v1::UploadCaseRequest>* reader,
+                          v1::UploadCaseResponse* response) override {
+    if (!refusal.ok()) return refusal;
+    v1::UploadCaseRequest request;
+    while (reader->Read(&request)) received += request.data();
+    while (holds && !context->IsCancelled()) std::this_thread::sleep_for(1ms);
+    was_cancelled = context->IsCancelled();
+    response->mutable_stored()->set_case_hash(std::string(32, 'h'));
+    response->mutable_stored()->set_title("Tibia");
+    response->mutable_stored()->set_bytes(77);
+    response->set_known(true);
+    return {};
+  }
+
+  grpc::Status refusal;
+  std::string received;
+  std::atomic<bool> holds{false}, was_cancelled{false};
+};
+
+class FakeRooms final : public v1::RoomsService::Service {
+ public:
+  grpc::Status CreateRoom(grpc::ServerContext* context, const v1::CreateRoomRequest* request,
+                          v1::CreateRoomResponse*) override {
+    asked = *request;
+    const auto named = context->client_metadata().find("osteon-room-bin");
+    if (named != context->client_metadata().end()) in_room = {named->second.data(), named->second.size()};
+    return answer;
+  }
+
+  v1::CreateRoomRequest asked;
+  std::string in_room;
+  grpc::Status answer;
+};
+
+class CaseClientTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    for (std::size_t i = 0; i < kArchiveBytes; ++i) bytes_ += static_cast<char>((i * i) >> 3);
+    std::ofstream(archive_, std::ios::binary) << bytes_;
+    grpc::ServerBuilder builder;
+    int port = 0;
+    builder.AddListeningPort("127.0.0.1:0", grpc::InsecureServerCredentials(), &port);
+    builder.RegisterService(&cases_);
+    builder.RegisterService(&rooms_);
+    server_ = builder.BuildAndStart();
+    ASSERT_NE(server_, nullptr);
+    channel_ = grpc::CreateChannel("127.0.0.1:" + std::to_string(port), grpc::InsecureChannelCredentials());
+  }
+  void TearDown() override { server_->Shutdown(std::chrono::system_clock::now()); }
+
+  test::TempDir temp_;
+  std::filesystem::path archive_ = temp_ / "case.zip";
+  std::string bytes_;
+  FakeCases cases_;
+  FakeRooms rooms_;
+  std::unique_ptr<grpc::Server> server_;
+  std::shared_ptr<grpc::Channel> channel_;
+};
+
+TEST_F(CaseClientTest, AllBytesArriveInTheirOrder) {
+  std::vector<double> fractions;
+  const auto stored = upload_case(channel_, archive_, [&](double fraction) {
+    fractions.push_back(fraction);
+    return true;
+  });
+  ASSERT_TRUE(stored) << stored.error().message;
+  EXPECT_EQ(cases_.received, bytes_);
+  for (const std::uint8_t byte : stored->hash.bytes) EXPECT_EQ(byte, 'h');
+  EXPECT_EQ(stored->title, "Tibia");
+  EXPECT_EQ(stored->bytes, 77u);
+  EXPECT_TRUE(stored->known);
+  EXPECT_TRUE(std::ranges::is_sorted(fractions));
+  EXPECT_EQ(fractions.front(), 0.0);
+  EXPECT_EQ(fractions.back(), 1.0);
+}
+
+TEST_F(CaseClientTest, ARefusalIsTheSentenceOfTheServer) {
+  const std::pair<grpc::StatusCode, ErrorCode> meanings[] = {
+      {grpc::StatusCode::RESOURCE_EXHAUSTED, ErrorCode::exhausted},
+      {grpc::StatusCode::PERMISSION_DENIED, ErrorCode::denied},
+      {grpc::StatusCode::INVALID_ARGUMENT, ErrorCode::invalid_input},
+      {grpc::StatusCode::FAILED_PRECONDITION, ErrorCode::unavailable},
+      {grpc::StatusCode::DEADLINE_EXCEEDED, ErrorCode::unavailable}};
+  for (const auto& [said, meant] : meanings) {
+    cases_.refusal = {said, "no room on the shelf; come tomorrow"};
+    const auto stored = upload_case(channel_, archive_, {});
+    ASSERT_FALSE(stored);
+    EXPECT_EQ(stored.error().code, meant);
+    EXPECT_TRUE(stored.error().message.ends_with("no room on the shelf; come tomorrow")) << stored.error().message;
+  }
+}
+
+// The server has all and does not answer.
+TEST_F(CaseClientTest, AStopEndsTheCallWhileTheServerChecks) {
+  cases_.holds = true;
+  const auto stored = upload_case(channel_, archive_, [](double fraction) { return fraction < 1.0; });
+  ASSERT_FALSE(stored);
+  EXPECT_EQ(stored.error().code, ErrorCode::cancelled);
+  server_->Shutdown();  // the handler has returned then
+  EXPECT_TRUE(cases_.was_cancelled);
+}
+
+TEST_F(CaseClientTest, AStopInTheMiddleSendsNoEndOfTheData) {
+  const auto stored = upload_case(channel_, archive_, [](double fraction) { return fraction < 0.5; });
+  ASSERT_FALSE(stored);
+  EXPECT_EQ(stored.error().code, ErrorCode::cancelled);
+  server_->Shutdown();
+  EXPECT_TRUE(cases_.was_cancelled);
+  EXPECT_LT(cases_.received.size(), bytes_.size());
+}
+
+TEST_F(CaseClientTest, AServerThatEndsInTheMiddleIsOneSentence) {
+  cases_.holds = true;
+  bool ended = false;
+  const auto stored = upload_case(channel_, archive_, [&](double fraction) {
+    if (fraction > 0.5 && !std::exchange(ended, true)) server_->Shutdown(std::chrono::system_clock::now());
+    return true;
+  });
+  ASSERT_FALSE(stored);
+  EXPECT_EQ(stored.error().code, ErrorCode::unavailable);
+  EXPECT_NE(stored.error().message.find("send the case again"), std::string::npos) << stored.error().message;
+}
+
+TEST_F(CaseClientTest, AFileThatIsNotThereIsNamed) {
+  const auto stored = upload_case(channel_, temp_ / "no.zip", {});
+  ASSERT_FALSE(stored);
+  EXPECT_EQ(stored.error().code, ErrorCode::not_found);
+  EXPECT_NE(stored.error().message.find("no.zip"), std::string::npos);
+}
+
+TEST_F(CaseClientTest, ARoomIsAskedForByNameAndCase) {
+  Digest hash;
+  hash.bytes.fill(0x5a);
+  const auto opened = create_room_with(channel_, "ward", hash, {});
+  EXPECT_TRUE(opened) << opened.error().message;
+  EXPECT_EQ(rooms_.asked.name(), "ward");
+  EXPECT_EQ(rooms_.asked.case_hash(), std::string(32, 0x5a));
+  EXPECT_EQ(rooms_.in_room, "ward");
+  rooms_.answer = {grpc::StatusCode::ALREADY_EXISTS, "there is a room ward"};
+  const auto refused = create_room_with(channel_, "ward", hash, {});
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, ErrorCode::exists);
+  EXPECT_EQ(refused.error().message, "there is a room ward");
+}
+
+}  // namespace
+}  // namespace osteon::wire

@@ -1,0 +1,108 @@
+#include "viewer_client/desktop/send_dialog.hpp"
+
+#include <QDialogButtonBox>
+#include <QFormLayout>
+#include <QLabel>
+#include <QProgressBar>
+#include <QPushButton>
+#include <QVBoxLayout>
+#include <utility>
+
+#include "viewer_client/desktop/enabled.hpp"
+
+namespace osteon {
+
+SendDialog::SendDialog(std::filesystem::path what, const QString& title, QWidget* parent)
+    : QDialog(parent), what_(std::move(what)) {
+  setObjectName("send_dialog");
+  setWindowTitle(tr("Send %1 to a server").arg(title));
+  auto* all = new QVBoxLayout(this);
+  auto* form = new QFormLayout;
+  all->addLayout(form);
+  fields_.emplace(*form);
+  fields_->add_address();
+  room_ = fields_->add(tr("Room to open with it (empty: none)"), "new_room");
+  fields_->add_credentials();
+  words_ = new QLabel;
+  words_->setObjectName("send_words");
+  words_->setWordWrap(true);
+  words_->setTextFormat(Qt::PlainText);  // what a server says is no HTML
+  all->addWidget(words_);
+  progress_ = new QProgressBar;
+  progress_->setObjectName("send_progress");
+  progress_->setAccessibleName(tr("Progress"));
+  all->addWidget(progress_);
+  auto* buttons = new QDialogButtonBox;
+  send_ = buttons->addButton(tr("&Send"), QDialogButtonBox::ActionRole);
+  send_->setObjectName("send_case");
+  send_->setToolTip(tr("Sends the case. The one on this computer stays as it is."));
+  send_->setDefault(true);
+  close_ = buttons->addButton(QDialogButtonBox::Close);
+  close_->setObjectName("send_close");
+  connect(send_, &QPushButton::clicked, this, [this] { send(); });
+  connect(close_, &QPushButton::clicked, this, [this] { reject(); });
+  all->addWidget(buttons);
+  end(tr("The server checks the case and keeps it. Whoever may open rooms there can send it."));
+}
+
+SendDialog::~SendDialog() = default;
+
+void SendDialog::reject() {
+  if (!sending_) return QDialog::reject();
+  words_->setText(tr("Cancelling…"));
+  sending_->cancel();
+}
+
+void SendDialog::send() {
+  if (sending_) return;
+  fields_->remember();
+  const auto credentials = fields_->credentials();
+  if (!credentials) return end(QString::fromStdString(credentials.error().message));
+  sending_ = std::make_unique<CaseSending>(
+      what_, RoomAddress{fields_->address(), room_->text().trimmed(), {}, *credentials},
+      CaseSending::Events{[this](CaseSending::Stage stage) { show_stage(stage); },
+                          [this](int percent) {
+                            progress_->setRange(0, 100);
+                            progress_->setValue(percent);
+                          },
+                          [this](const QString& sentence, const QString& room) {
+                            if (!room.isEmpty()) remember_field("room", room);  // where "Join a room" goes next
+                            end(sentence);
+                          },
+                          [this](const QString& sentence) { end(sentence); }});
+  progress_->show();
+  enable_parts();
+  sending_->start();
+}
+
+void SendDialog::show_stage(CaseSending::Stage stage) {
+  progress_->setRange(0, 0);
+  switch (stage) {
+    case CaseSending::Stage::packing:
+      return words_->setText(tr("The case is being packed"));
+    case CaseSending::Stage::connecting:
+      return words_->setText(tr("Connecting to %1").arg(fields_->address()));
+    case CaseSending::Stage::sending:
+      return words_->setText(tr("The case is being sent"));
+    case CaseSending::Stage::checking:
+      return words_->setText(tr("The server checks the case"));
+    case CaseSending::Stage::opening:
+      return words_->setText(tr("The server opens the room"));
+  }
+}
+
+void SendDialog::end(const QString& sentence) {
+  if (sending_) sending_.release()->deleteLater();  // it is still in its event
+  words_->setText(sentence);
+  progress_->hide();
+  enable_parts();
+}
+
+void SendDialog::enable_parts() {
+  const QString reason = tr("The case is being sent. Wait for it, or cancel it.");
+  fields_->set_enabled(!sending_, reason);
+  set_enabled(*send_, !sending_, reason);
+  close_->setText(sending_ ? tr("Cancel") : tr("&Close"));
+}
+
+}  // namespace osteon
