@@ -251,20 +251,21 @@ class Packages(unittest.TestCase):
         self.assertEqual(components.depends(about, known), ["c", "x"])
 
 
-class Film(unittest.TestCase):
-    """Filmed is only where all is there. The film itself is for a quiet machine with the packages."""
+class Filmed(unittest.TestCase):
+    """Filmed is only where all is there. The films themselves are for a quiet machine with the packages."""
 
-    def refused(self, programs, path):
+    def refused(self, film, programs, path):
         with tempfile.TemporaryDirectory() as folder:
-            done = ended([ROOT / "tests/packages/film", "--bin", programs, Path(folder, "film")],
+            done = ended([ROOT / "tests/packages" / film, "--bin", programs, Path(folder, "film")],
                          env={**os.environ, "PATH": str(path)})
             self.assertEqual((done.returncode, done.stdout, os.listdir(folder)), (1, "", []))
         return done.stderr
 
     def test_needs_the_programs(self):
         with tempfile.TemporaryDirectory() as empty:
-            self.assertRegex(self.refused(empty, os.environ["PATH"]),
-                             r"\Afilm: there is no osteon in .*--bin FOLDER\n\Z")
+            for film in ("film", "segment"):
+                self.assertRegex(self.refused(film, empty, os.environ["PATH"]),
+                                 rf"\A{film}: there is no osteon in .*--bin FOLDER\n\Z")
 
     def test_needs_a_screen_and_hands(self):
         with tempfile.TemporaryDirectory() as folder:
@@ -273,8 +274,9 @@ class Film(unittest.TestCase):
                     program = Path(folder, name)
                     program.touch(mode=0o755)
                 Path(folder, missing).unlink()
-                self.assertEqual(self.refused(BIN, folder),
-                                 f"film: the package {package} is not installed; apt-get install {package}\n")
+                for film in ("film", "segment"):
+                    self.assertEqual(self.refused(film, BIN, folder),
+                                     f"{film}: the package {package} is not installed; apt-get install {package}\n")
 
 
 class Desktop(unittest.TestCase):

@@ -9,7 +9,10 @@
 #include <QPushButton>
 #include <QSettings>
 #include <QTreeWidget>
+#include <algorithm>
+#include <filesystem>
 #include <optional>
+#include <utility>
 
 #include "osteon/v1/people.pb.h"
 #include "server/rpc/room_server.hpp"
@@ -17,6 +20,8 @@
 #include "tests/support/authentication/people.hpp"
 #include "tests/unit/room/cuts.hpp"
 #include "viewer_client/desktop/c_arm_panel.hpp"
+#include "viewer_client/desktop/library.hpp"
+#include "viewer_client/desktop/slice_view.hpp"
 
 namespace osteon {
 namespace {
@@ -107,6 +112,18 @@ class ShotsTest : public test::WindowBench {
     options.keep_trying = true;
     options.cache = dir_ / "cache";
     return options;
+  }
+  void show_dock(const char* name, bool shown) const {
+    auto* dock = window_->findChild<QDockWidget*>(name);
+    if (dock->isVisible() != shown) dock->toggleViewAction()->trigger();
+  }
+  // Calls that the room has open, streams too: each has a share of it.
+  [[nodiscard]] long open_calls() const { return server_->rooms().find("ward").value().use_count() - 1; }
+  // Without the short ones.
+  [[nodiscard]] long open_streams() const {
+    long least = open_calls();
+    for (int i = 0; i < 20; ++i, QTest::qWait(25)) least = std::min(least, open_calls());
+    return least;
   }
   // The whole picture of one shot.
   static std::shared_ptr<const CArmPicture> shoot(const CArmPanel& panel) {
@@ -280,6 +297,41 @@ TEST_F(ShotsTest, AnObserversShotsStayInTheirWindow) {
   tree_of(panel()).setCurrentItem(tree_of(panel()).topLevelItem(1));
   expect_seen(panel(), *original);
   EXPECT_FALSE(tree_of(other_arm.panel()).isVisible());
+}
+
+// A hidden pane costs neither the network nor the server anything, and one stream is enough for all panes.
+TEST_F(ShotsTest, TheInsideIsFetchedWhileAPaneShowsItAndNotElse) {
+  // The window opens as the one before was left.
+  for (const char* name : {"slices_panel", "c_arm_panel"}) show_dock(name, false);
+  const std::filesystem::path cache = data_folder() / "cache";
+  std::filesystem::remove_all(cache);
+  window_->join(
+      {QString::fromStdString(server_->address()), "ward", "", people_.credentials("ben", Role::trainee, "ward")});
+  ASSERT_TRUE(until([&] { return view_->surface_shown(); })) << problem();
+  long without = -1;
+  ASSERT_TRUE(until([&] {
+    const long before = without;
+    without = open_streams();
+    return without == before;
+  }));
+  const auto* slice = window_->findChild<SliceView*>("slice_0");
+  const auto* shot = button_of(panel(), "c_arm_shot");
+  EXPECT_FALSE(std::filesystem::exists(cache));
+
+  for (const char* time : {"at first", "again"}) {
+    show_dock("slices_panel", true);
+    ASSERT_TRUE(until([&] { return slice->image() != nullptr; })) << time << problem();
+    EXPECT_EQ(open_streams(), without + 1) << time;
+    EXPECT_TRUE(std::filesystem::exists(cache));
+    show_dock("c_arm_panel", true);
+    ASSERT_TRUE(until([&] { return shot->isEnabled(); })) << time << problem();
+    EXPECT_EQ(open_streams(), without + 1) << time << ": both panes look at one bone";
+    show_dock("slices_panel", false);
+    EXPECT_EQ(open_streams(), without + 1) << time << ": the C-arm is still seen";
+    show_dock("c_arm_panel", false);
+    EXPECT_TRUE(until([&] { return open_calls() == without; })) << time << ": nothing is fetched any more";
+    EXPECT_EQ(open_streams(), without) << time;
+  }
 }
 
 // Of the same room: a plan is for everybody, as the shots are.

@@ -640,6 +640,31 @@ TEST_F(WrongUse, AServerThatIsKilledAgainAndAgainEndsTheRoomInOneSentence) {
   open(last);
 }
 
+// Somebody has changed the case on the server meanwhile. The bone of before would be another one than the room's.
+TEST_F(WrongUse, ARoomThatComesBackWithAnotherCaseEndsInOneSentence) {
+  const fs::path other = desk_->temp() / "other-block", file = desk_->temp() / "address-of-two";
+  ASSERT_EQ(test::run(test::program("osteon-import"), {"phantom", "block", "--layers", "5:1.9", "--width", "12",
+                                                       "--pitch", "0.5", "--out", other.string()})
+                .exit_code,
+            0);
+  const auto serve = [&](const fs::path& bone, const std::string& listen) {
+    return test::Process(test::program("osteon-server"),
+                         {"--case", bone.string(), "--plain", "--listen", listen, "--address-file", file.string()});
+  };
+  test::Process server = serve(desk_->bone(), "127.0.0.1:0");
+  ASSERT_TRUE(until([&] { return content(file).ends_with('\n'); })) << server.err();
+  const QString address = QString::fromStdString(content(file)).trimmed();
+  window_->join({address, {}, {}, {}});
+  ASSERT_TRUE(until([&] { return view_->surface_shown(); })) << problem();
+  server.signal(SIGKILL);
+  EXPECT_TRUE(until([&] { return label("connection") == "Connection lost, trying again"; })) << problem();
+  server = serve(other, address.toStdString());
+  EXPECT_EQ(refused(),
+            "the server at " + address.toStdString() + " now has another case: start the viewer anew to see it");
+  window_->join({address, {}, {}, {}});
+  EXPECT_TRUE(until([&] { return view_->surface_shown(); })) << "it can be seen at once: " << problem();
+}
+
 TEST_F(WrongUse, ARoomThatOthersRunGoesAndComesBack) {
   // In a room to practise in. It ends, because the window is in one room only.
   open();

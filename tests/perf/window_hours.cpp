@@ -29,7 +29,7 @@
 #include <string_view>
 #include <vector>
 
-#include "tests/integration/window_bench.hpp"
+#include "tests/perf/window_user.hpp"
 
 namespace osteon::test {
 namespace {
@@ -81,15 +81,7 @@ class DialogAnswer {
   QTimer timer_;
 };
 
-// Failures of the bench, as this program's messages.
-class ToStandardError : public testing::EmptyTestEventListener {
-  void OnTestPartResult(const testing::TestPartResult& result) override {
-    if (result.failed()) std::fprintf(stderr, "osteon-window-hours: %s\n", result.message());
-  }
-};
-
-// Each step returns false, after a message, if the window did not do what it should.
-class Person : public WindowBench {
+class Person : public WindowUser {
  public:
   bool sits_down();
   bool opens();
@@ -98,21 +90,8 @@ class Person : public WindowBench {
   bool closes();
   void leaves() { TearDown(); }
   [[nodiscard]] nlohmann::json seen() const;
-  // False: there is no screen.
-  [[nodiscard]] static bool gets_desk() {
-    SetUpTestSuite();
-    return desk_->stands();
-  }
-  static void clears_desk() { TearDownTestSuite(); }
 
  private:
-  void TestBody() override {}
-  template <class Condition>
-  bool sees(const char* what, Condition condition) {
-    if (until(condition, 180s)) return true;
-    std::fprintf(stderr, "osteon-window-hours: %s did not come: %s\n", what, problem().c_str());
-    return false;
-  }
   // A busy window may have said something else by the time that anybody looks.
   template <class Act, class Wait>
   bool says(const QString& sentence, Act act, Wait wait) {
@@ -120,7 +99,7 @@ class Person : public WindowBench {
     const auto listening = QObject::connect(window_->statusBar(), &QStatusBar::messageChanged,
                                             [&](const QString& said) { heard |= said.startsWith(sentence); });
     act();
-    const bool in_time = sees(sentence.toUtf8().constData(), [&] {
+    const bool in_time = sees(sentence.toStdString(), [&] {
       if (!heard) wait();
       return heard;
     });
@@ -180,7 +159,7 @@ bool Person::finds_places() {
         if (view_->pointer().on_bone()) places_.push_back(at);
       }
   if (places_.size() > kHoles) return true;
-  std::fprintf(stderr, "osteon-window-hours: the skull is not in the picture\n");
+  tell("the skull is not in the picture");
   return false;
 }
 
@@ -282,8 +261,7 @@ bool work_for(Person& person, std::chrono::duration<double, std::ratio<60>> time
 }
 
 int measure(double minutes, bool stays) {
-  bool done = Person::gets_desk();
-  if (!done) std::fprintf(stderr, "osteon-window-hours: Xvfb, of Debian's package xvfb, did not start\n");
+  bool done = Person::gets_desk("osteon-window-hours");
   nlohmann::json rounds = nlohmann::json::array();
   if (done) {
     Person person;
@@ -304,9 +282,5 @@ int main(int argc, char** argv) {
     std::fprintf(stderr, "osteon-window-hours: needs the minutes, and \"rooms\" or \"room\"\n");
     return 1;
   }
-  testing::InitGoogleTest();
-  auto& listeners = testing::UnitTest::GetInstance()->listeners();
-  delete listeners.Release(listeners.default_result_printer());
-  listeners.Append(new osteon::test::ToStandardError);
   return osteon::test::measure(minutes, kind == "room");
 }

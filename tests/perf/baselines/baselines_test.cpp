@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <ostream>
 #include <random>
 #include <string>
@@ -13,13 +14,16 @@
 #include "common/imaging/smoothing.hpp"
 #include "common/surface/block_source.hpp"
 #include "haptic_client/contact/patch_builder.hpp"
+#include "server/import/dicom_writer.hpp"
 #include "tests/perf/baselines/contact_input.hpp"
 #include "tests/perf/baselines/csg_cut.hpp"
 #include "tests/perf/baselines/dense_cut.hpp"
 #include "tests/perf/baselines/flying_edges.hpp"
+#include "tests/perf/baselines/gdcm_decode.hpp"
 #include "tests/perf/baselines/itk_smoothing.hpp"
 #include "tests/perf/baselines/leaf_cut.hpp"
 #include "tests/support/scenes/bones.hpp"
+#include "tests/support/temp_dir.hpp"
 
 namespace osteon::baselines {
 namespace {
@@ -350,6 +354,25 @@ TEST(FilterBaselines, GiveWhatOursGive) {
       squares += std::pow(theirs.values[i] - gaussian.values[i], 2.0);
     EXPECT_LT(std::sqrt(squares / static_cast<double>(theirs.values.size())), 12.0);
   }
+}
+
+TEST(DecodeBaseline, ReadsEveryVoxelOfEverySlice) {
+  imaging::HuVolume volume;
+  volume.dims = {4, 3, 5};
+  volume.values.assign(volume.count(), 40);
+  const osteon::test::TempDir folder;
+  const auto decoded = [&](const char* name) {
+    EXPECT_TRUE(import::write_dicom_series(volume, folder / name, [](double) { return true; }));
+    return gdcm_decode(folder / name);
+  };
+  const GdcmDecoded before = decoded("before");
+  EXPECT_EQ(before.slices, 5);
+  EXPECT_EQ(before.bytes, 2 * volume.count());
+  // Whatever number is stored for a HU, one more is one more.
+  std::int64_t more = 0;
+  for (std::size_t i = 0; i < volume.count(); ++i)
+    volume.values[i] += static_cast<std::int16_t>(i), more += static_cast<std::int64_t>(i);
+  EXPECT_EQ(decoded("after").sum - before.sum, more);
 }
 
 }  // namespace

@@ -12,6 +12,7 @@ import feel
 import filters
 import haptics
 import hours
+import imaging_page
 import imports
 import kernels
 import laws
@@ -261,8 +262,8 @@ def scan(run):
 
 
 GROUPS = {**kernels.GROUPS, **devices.GROUPS, **authentication.GROUPS, **insiders.GROUPS,
-          **feel.GROUPS, **filters.GROUPS, **haptics.GROUPS, **hours.GROUPS, **laws.GROUPS, **rooms.GROUPS,
-          **sounds.GROUPS, **viewing.GROUPS,
+          **feel.GROUPS, **filters.GROUPS, **haptics.GROUPS, **hours.GROUPS, **imaging_page.GROUPS,
+          **laws.GROUPS, **rooms.GROUPS, **sounds.GROUPS, **viewing.GROUPS,
           "expert": expert, "novice": novice, "rig": rig, "scan": scan, "real_imports": imports.real_imports,
           "import_accuracy": imports.import_accuracy,
           "phantoms": imports.phantoms,

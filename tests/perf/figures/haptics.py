@@ -1,6 +1,8 @@
-"""Figures of the haptic loop: the energy of its coupling, the cost of a tick, and the effect of a silent network.
-All devices and hands are simulated."""
+"""Figures of the haptic loop: the energy of its coupling, the cost of a tick, and the effect of a silent network and of
+a live C-arm. All devices and hands are simulated."""
 import json
+
+import numpy as np
 
 from registry import Measured
 
@@ -91,6 +93,42 @@ def blackout(run):
     }
 
 
+def c_arm(run):
+    """Simulated operators drill one hole each, every second one beside a C-arm that is live. Missed ticks come in
+    bursts when the host suspends a virtual machine, so their scatter is taken from the pairs if that is larger than
+    the scatter of counts."""
+    pairs = 12 if run.soak else 4
+    run.say(f"{2 * pairs} holes, half of them with a live C-arm")
+    runs = json.loads(run.output("osteon-c-arm-ticks", pairs, progress=True))["runs"]
+    run.tables.append((
+        f"haptic loop beside a window, real-time {'on' if all(r['realtime'] for r in runs) else 'refused'}",
+        [("C-arm", "shots", "ticks", "missed", "late us p50", "p99", "p99.9", "max", "work us p50", "p99")] +
+        [("live" if r["live"] else "hidden", r["shots"], r["ticks"], r["missed"], f"{r['late_p50_us']:.1f}",
+          f"{r['late_p99_us']:.1f}", f"{r['late_p999_us']:.1f}", f"{r['late_max_us']:.0f}", f"{r['work_p50_us']:.1f}",
+          f"{r['work_p99_us']:.1f}") for r in runs]))
+    live, hidden = ([r for r in runs if r["live"] == which] for which in (True, False))
+
+    def rates(of):
+        return np.array([1e4 * r["missed"] / r["ticks"] for r in of])
+
+    def sums(of, what):
+        return sum(r[what] for r in of)
+    # Neighbours in time make a pair. In counts of the hidden ones' ticks.
+    ticks = sums(hidden, "ticks")
+    with_it = sums(live, "missed") * ticks / sums(live, "ticks")
+    without = sums(hidden, "missed")
+    apart = 1e-4 * ticks / pairs * (rates(live) - rates(hidden))
+    scatter = max((with_it + without + 1.0) ** 0.5, float(np.std(apart, ddof=1)) * pairs ** 0.5)
+    return {
+        "c_arm_missed": Measured(1e4 * with_it / ticks, 1e4 * without / ticks, float(min(rates(live))),
+                                 float(max(rates(live)))),
+        "c_arm_missed_more": Measured((with_it - without) / scatter),
+        "c_arm_shots": Measured(sums(live, "shots")),
+        "c_arm_late_p99": Measured(float(np.median([r["late_p99_us"] for r in live])),
+                                   float(np.median([r["late_p99_us"] for r in hidden]))),
+    }
+
+
 def mount(run):
     """Two users on one bone, a million ticks over each connection. The same numbers on every machine."""
     run.say("mount: two users push a bone against each other, a million ticks over each of four lines")
@@ -114,4 +152,5 @@ def mount(run):
     return values
 
 
-GROUPS = {"haptic_tick": tick, "haptic_blackout": blackout, "haptic_stability": stability, "haptic_mount": mount}
+GROUPS = {"haptic_tick": tick, "haptic_blackout": blackout, "haptic_c_arm": c_arm, "haptic_stability": stability,
+          "haptic_mount": mount}

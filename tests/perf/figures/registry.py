@@ -329,6 +329,27 @@ FIGURES = [
     Figure("slices_over_vtk", "ratio", "three slices over those of vtkImageReslice", "radiology", ("<=", 0.5)),
     Figure("radiograph_difference", "ratio", "mean difference of both radiographs, of the photons that get through",
            "radiology", ("<=", 0.02)),
+    # Simulated operators who drill beside a window, every second one while the pedal of its C-arm is held.
+    Figure("c_arm_missed", "per_10000", "periods that no tick of the haptic loop ran in, per 10000 ticks, while the "
+           "C-arm of a window on the same machine is live", "haptic_c_arm",
+           baseline="with a hidden C-arm, in turns in the same run", full=True),
+    Figure("c_arm_missed_more", "sigma", "how many more they are than with a hidden C-arm, over what such counts "
+           "scatter by", "haptic_c_arm", ("<=", 3.0), full=True),
+    Figure("c_arm_shots", "count", "X-rays that were shot meanwhile; without them the former would prove nothing",
+           "haptic_c_arm", (">=", 40), full=True),
+    Figure("c_arm_late_p99", "us", "lateness of ticks meanwhile, 99th percentile, median of all operators",
+           "haptic_c_arm", baseline="with a hidden C-arm", full=True),
+    # The page of image processing with a DICOM folder of 512 x 512 x 302 voxels.
+    Figure("imaging_first_slice", "ratio", "time from the folder to its first slice on the page, over that of GDCM, "
+           "which reads all headers and decodes all slices once, in turns", "imaging_page", ("<=", 1.5), full=True),
+    Figure("imaging_first_slice_time", "s", "the former, median", "imaging_page", baseline="GDCM", full=True),
+    Figure("imaging_memory", "ratio", "growth of the page's process from before a scan is open to its peak, over the "
+           "scan's int16 voxels, while bones are kept, painted, cut and filtered, and all is undone and done again",
+           "imaging_page", ("<=", 2.5), full=True),
+    Figure("imaging_memory_whole", "ratio", "that peak itself, with the program and its libraries, over the voxels",
+           "imaging_page", baseline="before a scan is open", full=True),
+    Figure("imaging_memory_with_importer", "ratio", "the same together with osteon-import, its child", "imaging_page",
+           baseline="the page alone, before a scan is open", full=True),
     # An hour of drilling, undo and saving in the real window: resident memory by a line through all rounds after ten
     # minutes. In rooms: the case is closed and opened in each round. In a room: it stays open, and all is undone.
     *[Figure(f"window_{kind}_{program.removeprefix('osteon-')}", "percent",
