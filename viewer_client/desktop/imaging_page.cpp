@@ -164,27 +164,27 @@ QBoxLayout* ImagingPage::make_planes() {
          [this](int notches) { tools_->turn_radius(notches); }});
     grid->addWidget(planes_[i], static_cast<int>(i) / 2, static_cast<int>(i) % 2);
   }
-  grid->addWidget(make_corner(), 1, 1);
+  solid_ = new ImagingSolid(scene_, [this](const std::array<int, 3>& voxel) { look_at(voxel); });
+  grid->addWidget(solid_, 1, 1);
   for (int at = 0; at < 2; ++at) grid->setRowStretch(at, 1), grid->setColumnStretch(at, 1);
   all->addLayout(grid, 1);
+  all->addLayout(make_foot());
   return all;
 }
 
-QWidget* ImagingPage::make_corner() {
-  auto* corner = new QWidget;
-  auto* column = new QVBoxLayout(corner);
-  column->setContentsMargins(0, 0, 0, 0);
+QBoxLayout* ImagingPage::make_foot() {
+  auto* row = new QHBoxLayout;
   readout_ = new QLabel;
   readout_->setObjectName("readout");
   readout_->setWordWrap(true);
   readout_->setAlignment(Qt::AlignTop | Qt::AlignLeft);
-  column->addWidget(readout_, 1);
+  row->addWidget(readout_, 1);
   choice_ = new ImagingBoneChoice({[this](int bone, const QString& name) { name_bone(bone, name); },
                                    [this](int bone, int percent) { fade_bone(bone, percent); }});
-  column->addWidget(choice_);
+  row->addWidget(choice_, 1);
   landmarks_ = make_landmarks();
-  column->addWidget(landmarks_);
-  return corner;
+  row->addWidget(landmarks_, 1);
+  return row;
 }
 
 void ImagingPage::add_filter(QFormLayout& form) {
@@ -287,6 +287,7 @@ void ImagingPage::open_source(const QString& source) {
   }
   threshold_timer_.stop();
   wants_islands_ = false;
+  solid_->release();
   scene_.scan = {};
   scene_.islands = {};
   islands_.clear();
@@ -347,6 +348,7 @@ void ImagingPage::read_row(const QListWidgetItem* item) {
 }
 
 void ImagingPage::show_scan(ShownScan scan, const HuHistogram& histogram) {
+  solid_->release();
   scene_.scan = std::move(scan);
   histogram_->set_histogram(histogram);
   const auto& dims = scene_.scan.geometry.dims;
@@ -354,12 +356,14 @@ void ImagingPage::show_scan(ShownScan scan, const HuHistogram& histogram) {
   stack_->setCurrentIndex(kWorkPage);
   change_window(kBoneWindow);
   for (ImagingPlane* plane : planes_) plane->begin();
+  solid_->begin();
   planes_[0]->setFocus();
   work_.start();
   find_islands();
 }
 
 void ImagingPage::show_filtered(ShownScan scan, const HuHistogram& histogram) {
+  solid_->release();
   show_edges({});  // they were of the scan before
   scene_.scan = std::move(scan);
   shown_filter_ = searched_.filter;
@@ -387,6 +391,7 @@ void ImagingPage::find_islands() {
 
 void ImagingPage::show_islands(std::vector<ListedIsland> list, IslandMap map) {
   islands_ = std::move(list);
+  solid_->release();
   scene_.islands = std::move(map);
   const bool first = !found_;
   found_ = searched_;
@@ -457,6 +462,7 @@ void ImagingPage::refresh_list() {
 void ImagingPage::refresh_planes() {
   for (ImagingPlane* plane : planes_)
     if (plane != nullptr) plane->refresh();
+  if (solid_ != nullptr) solid_->refresh();
 }
 
 void ImagingPage::enable_parts() {

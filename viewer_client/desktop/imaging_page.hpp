@@ -14,6 +14,7 @@
 #include "viewer_client/desktop/imaging_histogram.hpp"
 #include "viewer_client/desktop/imaging_landmarks.hpp"
 #include "viewer_client/desktop/imaging_plane.hpp"
+#include "viewer_client/desktop/imaging_solid.hpp"
 #include "viewer_client/desktop/imaging_steps.hpp"
 #include "viewer_client/desktop/imaging_tools.hpp"
 #include "viewer_client/imaging/edit_history.hpp"
@@ -44,6 +45,8 @@ class ImagingPage : public QWidget {
     std::function<void()> leave;
   };
   explicit ImagingPage(Events events, QWidget* parent = nullptr);
+  // The scene goes before the widgets that show it.
+  ~ImagingPage() override { solid_->release(); }
 
   // A folder, zip, ISO image or file. What is open goes.
   void open_source(const QString& source);
@@ -55,7 +58,7 @@ class ImagingPage : public QWidget {
   QBoxLayout* make_head();
   QBoxLayout* make_work();
   QBoxLayout* make_planes();
-  QWidget* make_corner();
+  QBoxLayout* make_foot();
   void add_filter(QFormLayout& form);
   QBoxLayout* make_side();
   QPushButton* add_button(QBoxLayout& to, const QString& words, const char* name, const QString& tip,
@@ -166,6 +169,7 @@ class ImagingPage : public QWidget {
   ImagingLandmarks* landmarks_;
   ImagingHistogram* histogram_;
   std::array<ImagingPlane*, 3> planes_{};
+  ImagingSolid* solid_ = nullptr;
   QTimer threshold_timer_;  // the user has stopped to change the threshold
 };
 

@@ -1142,6 +1142,33 @@
     </message>
 </context>
 <context>
+    <name>ImagingSolid</name>
+    <message>
+        <source>Soft tissue</source>
+        <translation>Weichteile</translation>
+    </message>
+    <message>
+        <source>Shows skin and muscle of the scan round the bone</source>
+        <translation>Zeigt Haut und Muskeln des Scans um den Knochen</translation>
+    </message>
+    <message>
+        <source>This surface is too large. Take a higher threshold, or smooth the scan.</source>
+        <translation>Diese Oberfläche ist zu groß. Erhöhen Sie den Schwellwert, oder glätten Sie.</translation>
+    </message>
+    <message>
+        <source>The parts that were found last</source>
+        <translation>Die zuletzt gefundenen Teile</translation>
+    </message>
+    <message>
+        <source>Being made …</source>
+        <translation>Entsteht …</translation>
+    </message>
+    <message>
+        <source>What you keep appears here in three dimensions.</source>
+        <translation>Was Sie behalten, erscheint hier in drei Dimensionen.</translation>
+    </message>
+</context>
+<context>
     <name>ImagingSteps</name>
     <message>
         <source>CT, %1 slices, %2 × %3 pixels</source>
@@ -2531,6 +2558,17 @@
     <message>
         <source>Ctrl and wheel, or + and -: nearer or farther.</source>
         <translation>Strg und Rad, oder + und -: näher oder ferner.</translation>
+    </message>
+</context>
+<context>
+    <name>SolidView</name>
+    <message>
+        <source>Three dimensions</source>
+        <translation>Drei Dimensionen</translation>
+    </message>
+    <message>
+        <source>Left drag: turn. Wheel: nearer. Double click or Enter: the crosshair goes there. Home: all.</source>
+        <translation>Links ziehen: drehen. Rad: näher. Doppelklick, Eingabe: Fadenkreuz. Pos1: alles.</translation>
     </message>
 </context>
 <context>

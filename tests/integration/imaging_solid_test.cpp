@@ -1,0 +1,194 @@
+// The three-dimensional picture of image processing, with the mouse and the keyboard: it shows what is kept, follows
+// the edits, moves the crosshair, and shows soft tissue.
+#include <gtest/gtest.h>
+
+#include <QCheckBox>
+#include <QLabel>
+#include <QListWidget>
+#include <QPushButton>
+#include <QScrollArea>
+#include <QSlider>
+#include <QTest>
+#include <QWheelEvent>
+#include <cmath>
+#include <cstdlib>
+
+#include "tests/integration/imaging_bench.hpp"
+#include "viewer_client/desktop/imaging_solid.hpp"
+
+namespace osteon {
+namespace {
+
+using test::two_balls;
+
+class ImagingSolidTest : public test::ImagingBench {
+ protected:
+  void SetUp() override {
+    ImagingBench::SetUp();
+    window_->process_images(QString::fromStdString(series("solid", two_balls()).string()));
+    auto& list = part<QListWidget>("series");
+    ASSERT_TRUE(until([&] { return list.isVisible() && list.count() == 1; })) << words();
+    QTest::mouseClick(list.viewport(), Qt::LeftButton, {}, list.visualItemRect(list.item(0)).center());
+    ASSERT_TRUE(until([&] { return islands().isVisible() && islands().isEnabled() && islands().count() == 2; }))
+        << words();
+    part<QSlider>("slice_axial").setValue(12);
+  }
+  [[nodiscard]] QListWidget& islands() const { return part<QListWidget>("islands"); }
+  [[nodiscard]] ImagingSolid& solid() const {
+    auto* found = dynamic_cast<ImagingSolid*>(window_->findChild<QWidget*>("solid"));
+    EXPECT_NE(found, nullptr);
+    return *found;
+  }
+  [[nodiscard]] SolidView& view() const { return solid().view(); }
+  void keep(int side) {
+    ImagingPlane& axial = plane("plane_axial");
+    double_click(axial, axial.pixel(ball(side)));
+  }
+  [[nodiscard]] static Vec3 middle_of(int side) { return Vec3(side * test::kApart_mm, 0, 0); }
+  // Where a point is in the picture.
+  [[nodiscard]] QPoint pixel(const Vec3& point_mm) const {
+    const CameraView from = view().camera();
+    const Vec3 ahead = (from.target_mm - from.eye_mm).normalized(), right = ahead.cross(from.up).normalized();
+    const Vec3 seen = point_mm - from.eye_mm;
+    const double px = 0.5 * view().height() / std::tan(0.5 * from.view_angle_rad) / seen.dot(ahead);
+    return {static_cast<int>(0.5 * view().width() + px * seen.dot(right)),
+            static_cast<int>(0.5 * view().height() - px * seen.dot(right.cross(ahead)))};
+  }
+  // The part of the pixels about a point that have a colour. The crosshair takes some.
+  template <class Has>
+  [[nodiscard]] double share(const Vec3& point_mm, Has has) const {
+    constexpr int kAbout_px = 8;
+    const QPoint at = pixel(point_mm);
+    const Image image = view().scene().image();
+    int count = 0, all = 0;
+    for (int y = at.y() - kAbout_px; y <= at.y() + kAbout_px; ++y)
+      for (int x = at.x() - kAbout_px; x <= at.x() + kAbout_px; ++x, ++all)
+        if (x >= 0 && y >= 0 && x < image.width_px && y < image.height_px && has(image.at(x, y))) ++count;
+    return static_cast<double>(count) / all;
+  }
+  // Ivory, in light or in shadow. The background is blue, and the crosshair is green.
+  [[nodiscard]] bool shows_bone(const Vec3& point_mm) const {
+    return share(point_mm, [](const auto& c) { return c[0] > 90 && c[0] > c[1] && c[1] > c[2] + 8; }) > 0.6;
+  }
+  [[nodiscard]] bool shows_muscle(const Vec3& point_mm) const {
+    return share(point_mm, [](const auto& c) { return c[0] > c[1] + 15 && c[0] > c[2] + 15; }) > 0.6;
+  }
+  [[nodiscard]] bool shows(bool left, bool right) const {
+    return view().frames() > 0 && view().isVisible() && solid().current() && shows_bone(middle_of(1)) == left &&
+           shows_bone(middle_of(-1)) == right;
+  }
+  void drag(const QPoint& by) const {
+    const QPoint begin = view().rect().center();
+    QTest::mousePress(&view(), Qt::LeftButton, {}, begin);
+    for (int step = 1; step <= 4; ++step) {
+      QMouseEvent move(QEvent::MouseMove, begin + by * step / 4, Qt::NoButton, Qt::LeftButton, {});
+      QApplication::sendEvent(&view(), &move);
+    }
+    QTest::mouseRelease(&view(), Qt::LeftButton, {}, begin + by);
+  }
+  [[nodiscard]] Vec3 crosshair_mm() const {
+    const imaging::HuVolume scan = two_balls();
+    return scan.position_mm(
+        Vec3(plane("plane_sagittal").slice(), plane("plane_coronal").slice(), plane("plane_axial").slice()));
+  }
+  // Where the line of sight through a pixel meets a ball first.
+  [[nodiscard]] Vec3 on_ball(int side, const QPoint& at) const {
+    const SightRay ray = ray_through(view().camera(), view().width(), view().height(), at.x(), at.y());
+    const Vec3 to = middle_of(side) - ray.from_mm;
+    const double along = to.dot(ray.direction);
+    const double beside2 = to.squaredNorm() - along * along;
+    EXPECT_LT(beside2, test::kBall_mm * test::kBall_mm);
+    return ray.from_mm + (along - std::sqrt(test::kBall_mm * test::kBall_mm - beside2)) * ray.direction;
+  }
+  // A picture of the window, for who wants to look at it.
+  void keep_picture(const char* name) const {
+    if (const char* folder = std::getenv("OSTEON_TEST_PICTURES"))
+      window_->grab().save(QString("%1/%2.png").arg(folder, name));
+  }
+};
+
+// A voxel of 0.9 x 0.9 x 1.5 mm, and half of one to its middle.
+constexpr double kNear_mm = 2.2;
+
+TEST_F(ImagingSolidTest, WhatIsKeptIsSeenAndChoosesTheCrosshair) {
+  EXPECT_TRUE(part<QLabel>("solid_hint").isVisible());
+  EXPECT_FALSE(view().isVisible()) << "an empty picture is drawn";
+  keep(1);
+  keep(-1);
+  ASSERT_TRUE(until([&] { return shows(true, true); })) << words();
+  keep_picture("solid_both");
+  EXPECT_FALSE(shows_bone(middle_of(0)));
+
+  // Space takes the tick of the part away.
+  islands().setFocus();
+  islands().setCurrentRow(0);
+  QTest::keyClick(&islands(), Qt::Key_Space);
+  ASSERT_TRUE(until([&] { return shows(true, false) || shows(false, true); })) << words();
+  QTest::keySequence(window_.get(), QKeySequence::Undo);
+  ASSERT_TRUE(until([&] { return shows(true, true); })) << words();
+  QTest::keySequence(window_.get(), QKeySequence::Undo);
+  ASSERT_TRUE(until([&] { return shows(true, false); })) << words();
+
+  // The left ball alone fills the picture.
+  EXPECT_GT((crosshair_mm() - middle_of(1)).norm(), 20.0);
+  const QPoint at = pixel(middle_of(1)) + QPoint(6, -4);
+  const Vec3 met_mm = on_ball(1, at);
+  double_click(view(), at);
+  EXPECT_LT((crosshair_mm() - met_mm).norm(), kNear_mm);
+  const CameraView before = view().camera();
+  drag({80, 30});
+  const CameraView after = view().camera();
+  EXPECT_LT((after.target_mm - before.target_mm).norm(), 1e-6);
+  EXPECT_GT((after.eye_mm - before.eye_mm).norm(), 10.0);
+  QWheelEvent wheel(QPointF(view().rect().center()), view().mapToGlobal(view().rect().center()), {}, {0, 120},
+                    Qt::NoButton, {}, Qt::NoScrollPhase, false);
+  QApplication::sendEvent(&view(), &wheel);
+  EXPECT_LT((view().camera().eye_mm - before.target_mm).norm(), (after.eye_mm - after.target_mm).norm());
+  const std::uint64_t drawn = view().frames();
+  ASSERT_TRUE(until([&] { return view().frames() > drawn; }));
+  const Vec3 ahead_mm = on_ball(1, view().rect().center());
+  EXPECT_GT((ahead_mm - met_mm).norm(), 2.0 * kNear_mm) << "the view has hardly turned";
+  QTest::keyClick(&view(), Qt::Key_Return);
+  EXPECT_LT((crosshair_mm() - ahead_mm).norm(), kNear_mm);
+  QTest::qWait(200);
+  keep_picture("solid_turned");
+
+  // Without any bone there is no picture.
+  QTest::keySequence(window_.get(), QKeySequence::Undo);
+  EXPECT_TRUE(until([&] { return !view().isVisible() && part<QLabel>("solid_hint").isVisible(); }));
+}
+
+TEST_F(ImagingSolidTest, SoftTissueIsCoarseWhileTheViewMoves) {
+  keep(1);
+  ASSERT_TRUE(until([&] { return shows(true, false); })) << words();
+  const Vec3 beside_mm = middle_of(1) + Vec3(0, 0, 11);  // muscle above the ball
+  EXPECT_FALSE(shows_muscle(beside_mm));
+  EXPECT_FALSE(part<QCheckBox>("soft_tissue").isChecked());
+  QTest::keySequence(window_.get(), QKeySequence("Ctrl+Alt+V"));
+  ASSERT_TRUE(until([&] { return shows_muscle(beside_mm); })) << words();
+  EXPECT_EQ(view().coarse_frames(), 0u);
+  keep_picture("solid_soft");
+  drag({30, 0});
+  ASSERT_TRUE(until([&] { return view().coarse_frames() > 0; }));
+  const std::uint64_t fine = view().frames() - view().coarse_frames();
+  ASSERT_TRUE(until([&] { return view().frames() - view().coarse_frames() > fine; })) << "it stays coarse at rest";
+  EXPECT_TRUE(shows_muscle(beside_mm));
+  QTest::mouseClick(&part<QCheckBox>("soft_tissue"), Qt::LeftButton, {}, QPoint(8, 8));
+  EXPECT_TRUE(until([&] { return !shows_muscle(beside_mm) && shows(true, false); }));
+
+  // On a small screen each part has the room that it needs.
+  window_->resize(1024, 768);
+  QTest::qWait(300);
+  const auto* page = view().parentWidget();
+  while (page != nullptr && qobject_cast<const QScrollArea*>(page) == nullptr) page = page->parentWidget();
+  ASSERT_NE(page, nullptr);
+  const QWidget* work = static_cast<const QScrollArea*>(page)->widget();
+  EXPECT_LE(work->minimumSizeHint().width(), work->width());
+  EXPECT_LE(work->minimumSizeHint().height(), work->height());
+  EXPECT_GE(view().width(), view().minimumSizeHint().width());
+  EXPECT_GE(view().height(), view().minimumSizeHint().height());
+  keep_picture("solid_small");
+}
+
+}  // namespace
+}  // namespace osteon

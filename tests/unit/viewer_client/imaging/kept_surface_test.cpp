@@ -1,0 +1,153 @@
+// The surface of what is kept, against balls of known place and radius.
+#include "viewer_client/imaging/kept_surface.hpp"
+
+#include <gtest/gtest.h>
+
+#include <numbers>
+
+#include "common/geometry/triangle_mesh.hpp"
+#include "viewer_client/imaging/reduced_scan.hpp"
+
+namespace osteon {
+namespace {
+
+const KeepGoing kGoOn = [](double) { return true; };
+constexpr double kLarge_mm = 20.0, kSmall_mm = 9.0;  // radii
+
+// Two balls in oblique voxels that are no cubes: island 1 is the large one, and island 2 the small one.
+class KeptSurface : public testing::Test {
+ protected:
+  KeptSurface() {
+    scan_.dims = {220, 170, 45};
+    scan_.origin_mm = {-30.0, 12.0, 5.0};
+    scan_.axes_mm =
+        Eigen::AngleAxisd(0.5, Vec3(2, 1, 3).normalized()).toRotationMatrix() * Vec3(0.5, 0.5, 1.2).asDiagonal();
+    large_mm_ = scan_.position_mm(Vec3(70, 80, 22));
+    small_mm_ = scan_.position_mm(Vec3(170, 90, 20));
+    VoxelFile<std::uint8_t> numbers{scan_, {}};
+    for (int k = 0; k < scan_.dims[2]; ++k)
+      for (int j = 0; j < scan_.dims[1]; ++j)
+        for (int i = 0; i < scan_.dims[0]; ++i) {
+          const Vec3 at = scan_.position_mm(Vec3(i, j, k));
+          const bool large = (at - large_mm_).norm() <= kLarge_mm, small = (at - small_mm_).norm() <= kSmall_mm;
+          numbers.values.push_back(large ? 1 : small ? 2 : 0);
+        }
+    islands_ = *IslandMap::make(scan_, std::move(numbers));
+    kept_.bones[1].set(1);
+    const ScanBlocks blocks = blocks_of(scan_);
+    block_mm_ = blocks.geometry.axes_mm.colwise().norm().maxCoeff();
+    EXPECT_EQ(blocks.step, (std::array<int, 3>{2, 2, 1}));
+  }
+  [[nodiscard]] Mesh surface() const {
+    auto made = kept_surface(scan_, islands_, kept_, kGoOn);
+    EXPECT_TRUE(made) << made.error().message;
+    return made ? std::move(*made) : Mesh();
+  }
+  void correct(Correction correction) {
+    kept_.corrections.push_back(std::make_shared<const Correction>(std::move(correction)));
+  }
+  // All of it lies on the sphere, to within a block.
+  void expect_ball(const Mesh& mesh, const Vec3& centre_mm, double radius_mm) const {
+    ASSERT_FALSE(mesh.triangles.empty());
+    const TriangleMesh plain{mesh.positions_mm, mesh.triangles, {}};
+    EXPECT_EQ(open_edges(plain), 0u);
+    const auto volume_mm3 = [](double radius) { return 4.0 / 3.0 * std::numbers::pi * radius * radius * radius; };
+    EXPECT_GT(enclosed_mm3(plain), volume_mm3(radius_mm - 0.5 * block_mm_));
+    EXPECT_LT(enclosed_mm3(plain), volume_mm3(radius_mm + 0.5 * block_mm_));
+    for (std::uint32_t vertex = 0; vertex < mesh.positions_mm.size(); ++vertex) {
+      const Vec3 from_centre = position(plain, vertex) - centre_mm;
+      ASSERT_NEAR(from_centre.norm(), radius_mm, block_mm_);
+      const auto& [x, y, z] = mesh.normals[vertex];
+      ASSERT_GT(from_centre.normalized().dot(Vec3(x, y, z)), 0.6) << "it points inwards";
+    }
+  }
+
+  ScanGeometry scan_;
+  Vec3 large_mm_, small_mm_;
+  IslandMap islands_;
+  KeptParts kept_;
+  double block_mm_ = 0.0;
+};
+
+TEST_F(KeptSurface, ABallLiesWhereItIs) {
+  expect_ball(surface(), large_mm_, kLarge_mm);
+  kept_.bones = {};
+  kept_.bones[2].set(7);
+  expect_ball(surface(), small_mm_, kSmall_mm);
+}
+
+TEST_F(KeptSurface, NothingRemainsOfWhatIsDropped) {
+  EXPECT_FALSE(surface().triangles.empty());
+  const KeptParts before = kept_;
+  // No seed, an eraser over all, a cut beside the ball, and a box beside it.
+  kept_.bones = {};
+  EXPECT_TRUE(surface().triangles.empty());
+  kept_ = before;
+  correct({CorrectionKind::erase, 0, {large_mm_}, 25.0, Vec3::Zero()});
+  EXPECT_TRUE(surface().triangles.empty());
+  kept_ = before;
+  const Vec3 along = scan_.axes_mm.col(0).normalized();
+  correct({CorrectionKind::cut, 1, {large_mm_ - 21.0 * along}, 0.0, along});
+  EXPECT_TRUE(surface().triangles.empty());
+  kept_ = before;
+  kept_.box = MarkedBox{scan_.position_mm(Vec3(140, 60, 2)), scan_.position_mm(Vec3(210, 120, 40))};
+  EXPECT_TRUE(surface().triangles.empty());
+}
+
+TEST_F(KeptSurface, ACutLeavesItsSide) {
+  const Vec3 along = scan_.axes_mm.col(0).normalized();
+  correct({CorrectionKind::cut, 1, {large_mm_}, 0.0, along});
+  const Mesh half = surface();
+  const TriangleMesh plain{half.positions_mm, half.triangles, {}};
+  for (std::uint32_t vertex = 0; vertex < half.positions_mm.size(); ++vertex)
+    ASSERT_LT((position(plain, vertex) - large_mm_).dot(along), block_mm_);
+  const double ball_mm3 = 4.0 / 3.0 * std::numbers::pi * kLarge_mm * kLarge_mm * kLarge_mm;
+  EXPECT_NEAR(enclosed_mm3(plain), 0.5 * ball_mm3, 0.08 * ball_mm3);
+}
+
+// A cut of another bone changes nothing, and paint needs no island. The box bounds it.
+TEST_F(KeptSurface, PaintIsKeptWithinTheBox) {
+  correct({CorrectionKind::cut, 3, {large_mm_}, 0.0, Vec3::UnitX()});
+  expect_ball(surface(), large_mm_, kLarge_mm);
+  kept_.bones = {};
+  const Vec3 beside = scan_.position_mm(Vec3(180, 40, 22));
+  correct({CorrectionKind::paint, 5, {beside}, 8.0, Vec3::Zero()});
+  expect_ball(surface(), beside, 8.0);
+  kept_.box = MarkedBox{scan_.position_mm(Vec3(0, 0, 0)), scan_.position_mm(Vec3(180, 169, 44))};
+  const Mesh half = surface();
+  const TriangleMesh plain{half.positions_mm, half.triangles, {}};
+  const Vec3 along = scan_.axes_mm.col(0).normalized();
+  ASSERT_FALSE(half.triangles.empty());
+  for (std::uint32_t vertex = 0; vertex < half.positions_mm.size(); ++vertex)
+    ASSERT_LT((position(plain, vertex) - beside).dot(along), block_mm_);
+}
+
+TEST_F(KeptSurface, ACancelledOneGivesNone) {
+  int asked = 0;
+  const auto stopped = kept_surface(scan_, islands_, kept_, [&](double) { return ++asked < 20; });
+  ASSERT_FALSE(stopped);
+  EXPECT_EQ(stopped.error().code, ErrorCode::cancelled);
+  EXPECT_EQ(asked, 20) << "it goes on after it was stopped";
+}
+
+// A wall of one voxel among blocks of four is a quarter of them.
+TEST(KeptSurfaceOfThinBone, IsNotLost) {
+  ScanGeometry scan;
+  scan.dims = {640, 16, 16};
+  scan.axes_mm = 0.5 * Eigen::Matrix3d::Identity();
+  VoxelFile<std::uint8_t> numbers{scan, std::vector<std::uint8_t>(scan.count())};
+  for (int k = 0; k < 16; ++k)
+    for (int i = 40; i < 600; ++i) numbers.values[numbers.index({i, 6, k})] = 1;
+  KeptParts kept;
+  kept.bones[1].set(1);
+  ASSERT_EQ(blocks_of(scan).step, (std::array<int, 3>{4, 4, 4}));
+  const auto wall = kept_surface(scan, *IslandMap::make(scan, std::move(numbers)), kept, kGoOn);
+  ASSERT_TRUE(wall);
+  const Box box = bounds({wall->positions_mm, wall->triangles, {}});
+  EXPECT_NEAR(box.min_mm.x(), 20.0, 2.0);
+  EXPECT_NEAR(box.max_mm.x(), 300.0, 2.0);
+  EXPECT_NEAR(box.centre_mm().y(), 3.0, 2.0);
+}
+
+}  // namespace
+}  // namespace osteon

@@ -1,0 +1,213 @@
+#include "viewer_client/desktop/imaging_solid.hpp"
+
+#include <QCheckBox>
+#include <QLabel>
+#include <QPainter>
+#include <QSignalBlocker>
+#include <QStackedWidget>
+#include <QVBoxLayout>
+#include <algorithm>
+#include <atomic>
+#include <utility>
+
+#include "viewer_client/imaging/reduced_scan.hpp"
+
+namespace osteon {
+
+namespace {
+
+constexpr int kEditPause_ms = 150;  // a drag is many edits
+constexpr int kFrame_px = 1;        // for the frame of the keyboard's focus
+constexpr QColor kFocusFrame{250, 220, 120};
+
+VoxelGrid grid_of(const ScanGeometry& scan) { return {scan.dims, scan.origin_mm, scan.axes_mm}; }
+
+Box corners_of(const ScanGeometry& scan) {
+  Box box;
+  for (int corner = 0; corner < 8; ++corner) {
+    Vec3 voxel;
+    for (int axis = 0; axis < 3; ++axis)
+      voxel[axis] = (corner >> axis & 1) == 0 ? -0.5 : scan.dims[static_cast<std::size_t>(axis)] - 0.5;
+    box.include(scan.position_mm(voxel));
+  }
+  return box;
+}
+
+Box points_of(const Mesh& mesh) {
+  Box box;
+  for (const auto& [x, y, z] : mesh.positions_mm)
+    box.include({static_cast<double>(x), static_cast<double>(y), static_cast<double>(z)});
+  return box;
+}
+
+}  // namespace
+
+struct ImagingSolid::Job {
+  KeptParts kept;
+  bool surface = false, soft = false;  // which are to be made
+  std::atomic<bool> cancelled{false};
+  Result<Mesh> mesh;
+  Result<ShownScan> hu;
+};
+
+ImagingSolid::ImagingSolid(const ImagingScene& scene, std::function<void(const std::array<int, 3>& voxel)> look_at,
+                           QWidget* parent)
+    : QWidget(parent), scene_(scene), look_at_(std::move(look_at)) {
+  setObjectName("solid");
+  soft_ = new QCheckBox(tr("Soft tissue"));
+  soft_->setObjectName("soft_tissue");
+  soft_->setShortcut(QKeySequence("Ctrl+Alt+V"));
+  soft_->setToolTip(QString("%1 (%2)").arg(tr("Shows skin and muscle of the scan round the bone"),
+                                           soft_->shortcut().toString(QKeySequence::NativeText)));
+  hint_ = new QLabel;
+  hint_->setObjectName("solid_hint");
+  hint_->setWordWrap(true);
+  hint_->setAlignment(Qt::AlignCenter);
+  view_ = new SolidView({[this](const Vec3& point_mm) {
+                           if (const auto voxel = voxel_of(scene_.scan.geometry, point_mm)) look_at_(*voxel);
+                         },
+                         [this] { update(); }});
+  stack_ = new QStackedWidget;
+  stack_->addWidget(hint_);
+  stack_->addWidget(view_);
+  auto* column = new QVBoxLayout(this);
+  column->setContentsMargins(kFrame_px, kFrame_px, kFrame_px, kFrame_px);
+  column->setSpacing(0);
+  column->addWidget(soft_);
+  column->addWidget(stack_, 1);
+  pause_.setSingleShot(true);
+  pause_.setInterval(kEditPause_ms);
+  connect(&pause_, &QTimer::timeout, this, [this] { ask(); });
+  connect(soft_, &QCheckBox::toggled, this, [this](bool on) {
+    if (!on) {
+      view_->scene().show_soft_tissue({}, {});
+      has_soft_ = false;
+      view_->redraw();
+    }
+    ask();
+    show_state();
+  });
+  show_state();
+}
+
+ImagingSolid::~ImagingSolid() { release(); }
+
+void ImagingSolid::release() {
+  pause_.stop();
+  wanted_.reset();
+  shown_.reset();
+  has_soft_ = false;
+  if (!maker_) return;
+  job_->cancelled = true;
+  maker_->wait();
+  maker_.release()->deleteLater();
+  job_.reset();
+}
+
+void ImagingSolid::begin() {
+  const QSignalBlocker quiet(soft_);
+  soft_->setChecked(false);
+  view_->scene().show_surface({});
+  view_->scene().show_soft_tissue({}, {});
+  has_surface_ = false;
+  problem_.clear();
+  view_->set_bounds(corners_of(scene_.scan.geometry));
+  view_->look_overview();
+  refresh();
+}
+
+KeptParts ImagingSolid::kept() const { return {scene_.look.kept, scene_.look.corrections, scene_.look.box}; }
+
+void ImagingSolid::refresh() {
+  if (!scene_.open()) return;
+  show_cross();
+  show_state();
+  // With a threshold of the look, the islands are those of another one. Their surface stays until they are found.
+  if (scene_.look.threshold_hu) return;
+  KeptParts now = kept();
+  if (now == wanted_) return;
+  wanted_ = std::move(now);
+  pause_.start();
+}
+
+void ImagingSolid::ask() {
+  if (!scene_.open() || !isVisible()) return;
+  auto job = std::make_unique<Job>();
+  job->kept = kept();
+  job->surface = !scene_.look.threshold_hu && job->kept != shown_;
+  job->soft = soft_->isChecked() && !has_soft_;
+  if (maker_) {
+    const bool covers = (!job->surface || (job_->surface && job_->kept == job->kept)) && (!job->soft || job_->soft);
+    if (!covers) job_->cancelled = true;
+    return;
+  }
+  if (job->surface || job->soft) make(std::move(job));
+  show_state();
+}
+
+void ImagingSolid::make(std::unique_ptr<Job> job) {
+  job_ = std::move(job);
+  // Neither the scan nor the islands change before release().
+  maker_.reset(QThread::create([&scene = scene_, &of = *job_] {
+    const KeepGoing keep_going = [&of](double /*fraction*/) { return !of.cancelled; };
+    if (of.surface) of.mesh = kept_surface(scene.scan.geometry, scene.islands, of.kept, keep_going);
+    if (of.soft) of.hu = reduced_scan(scene.scan, keep_going);
+  }));
+  connect(maker_.get(), &QThread::finished, this, [this, number = ++jobs_] {
+    if (number != jobs_ || !maker_) return;  // it was released meanwhile
+    maker_.release()->deleteLater();
+    const std::unique_ptr<Job> done = std::move(job_);
+    if (!done->cancelled) take(*done);
+    ask();
+    show_state();
+  });
+  maker_->start();
+}
+
+void ImagingSolid::take(Job& done) {
+  if (done.surface) {
+    shown_ = std::move(done.kept);
+    problem_ = done.mesh ? QString() : tr("This surface is too large. Take a higher threshold, or smooth the scan.");
+    const Mesh mesh = done.mesh ? std::move(*done.mesh) : Mesh();
+    has_surface_ = !mesh.triangles.empty();
+    view_->scene().show_surface(mesh);
+    if (has_surface_) view_->set_bounds(points_of(mesh));
+  }
+  if (done.soft && soft_->isChecked()) {
+    has_soft_ = true;
+    if (done.hu) view_->scene().show_soft_tissue(grid_of(done.hu->geometry), done.hu->values);
+  }
+  view_->redraw();
+}
+
+void ImagingSolid::show_cross() {
+  view_->scene().show_cross(grid_of(scene_.scan.geometry), scene_.crosshair);
+  view_->redraw();
+}
+
+void ImagingSolid::show_state() {
+  const bool older = scene_.look.threshold_hu.has_value() && has_surface_;
+  view_->scene().show_notice(older ? tr("The parts that were found last").toStdString() : std::string());
+  // Until something is to be seen, no time goes into drawing.
+  const bool something = has_surface_ || view_->scene().has_soft_tissue();
+  if (!something)
+    hint_->setText(!problem_.isEmpty() ? problem_
+                   : maker_ != nullptr ? tr("Being made …")
+                                       : tr("What you keep appears here in three dimensions."));
+  stack_->setCurrentWidget(something ? static_cast<QWidget*>(view_) : hint_);
+}
+
+void ImagingSolid::paintEvent(QPaintEvent* event) {
+  QWidget::paintEvent(event);
+  if (!view_->hasFocus()) return;
+  QPainter painter(this);
+  painter.setPen(kFocusFrame);
+  painter.drawRect(rect().adjusted(0, 0, -1, -1));
+}
+
+void ImagingSolid::showEvent(QShowEvent* event) {
+  QWidget::showEvent(event);
+  ask();
+}
+
+}  // namespace osteon

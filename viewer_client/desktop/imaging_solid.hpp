@@ -1,0 +1,78 @@
+// The fourth picture of the page of image processing: what is kept, in three dimensions, with the crosshair of the
+// planes, and with soft tissue round it on demand. It is made anew after each edit, on a thread of its own.
+#pragma once
+#include <QCoreApplication>
+#include <QThread>
+#include <QTimer>
+#include <QWidget>
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+
+#include "viewer_client/desktop/imaging_plane.hpp"
+#include "viewer_client/desktop/solid_view.hpp"
+#include "viewer_client/imaging/kept_surface.hpp"
+
+class QCheckBox;
+class QLabel;
+class QStackedWidget;
+
+namespace osteon {
+
+// [GUI thread]
+class ImagingSolid : public QWidget {
+  Q_DECLARE_TR_FUNCTIONS(ImagingSolid)
+
+ public:
+  // `scene` outlives it. `look_at`: the user has chosen a voxel of the surface.
+  ImagingSolid(const ImagingScene& scene, std::function<void(const std::array<int, 3>& voxel)> look_at,
+               QWidget* parent = nullptr);
+  ~ImagingSolid() override;
+
+  // Call this before the scan or the islands of the scene change, because the other thread reads them. It stops that
+  // thread, which takes the time of a slice.
+  void release();
+  // Another scan.
+  void begin();
+  // The scene has changed.
+  void refresh();
+
+  [[nodiscard]] SolidView& view() { return *view_; }
+  // Whether the surface is that of the scene's edits.
+  [[nodiscard]] bool current() const { return shown_ == kept(); }
+
+ protected:
+  void paintEvent(QPaintEvent* event) override;
+  void showEvent(QShowEvent* event) override;
+
+ private:
+  struct Job;
+
+  [[nodiscard]] KeptParts kept() const;
+  // Starts what is to be made. The newest wish wins: an older one is cancelled, and its end asks again.
+  void ask();
+  void make(std::unique_ptr<Job> job);
+  void take(Job& done);
+  void show_cross();
+  // Which picture there is, and what it says.
+  void show_state();
+
+  const ImagingScene& scene_;
+  std::function<void(const std::array<int, 3>& voxel)> look_at_;
+  std::optional<KeptParts> wanted_, shown_;  // `shown_`: nothing if islands or scan have changed since
+  bool has_surface_ = false, has_soft_ = false;
+  QString problem_;  // why there is no surface
+  QTimer pause_;     // since the last edit
+  QCheckBox* soft_;
+  QLabel* hint_;
+  QStackedWidget* stack_;
+  SolidView* view_;
+  // The other thread writes into the job, and the GUI thread reads it when that has ended.
+  std::unique_ptr<Job> job_;
+  std::unique_ptr<QThread> maker_;
+  std::uint64_t jobs_ = 0;  // so far
+};
+
+}  // namespace osteon

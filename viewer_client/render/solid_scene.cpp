@@ -1,0 +1,120 @@
+#include "viewer_client/render/solid_scene.hpp"
+
+#include <vtkActor.h>
+#include <vtkLineSource.h>
+#include <vtkNew.h>
+#include <vtkPolyDataMapper.h>
+#include <vtkProperty.h>
+#include <vtkRenderWindow.h>
+#include <vtkRenderer.h>
+
+#include "viewer_client/render/bone_actors.hpp"
+#include "viewer_client/render/layer_above.hpp"
+#include "viewer_client/render/lighting.hpp"
+#include "viewer_client/render/orientation_marker.hpp"
+#include "viewer_client/render/soft_tissue.hpp"
+#include "viewer_client/render/status_text.hpp"
+#include "viewer_client/render/view_of_camera.hpp"
+
+namespace osteon {
+
+namespace {
+
+constexpr std::array<double, 3> kCrossColour{0.35, 0.90, 0.55};  // as on the planes
+constexpr double kCrossBehind = 0.3;                             // opacity, where the surface hides it
+constexpr float kCrossWidth_px = 1.5f;
+
+}  // namespace
+
+struct SolidScene::Impl {
+  explicit Impl(vtkRenderWindow& on) : window(on) {
+    window.SetMultiSamples(0);  // several times slower in software
+    window.AddRenderer(renderer);
+    set_lighting(*renderer);
+    layer.emplace(window, BonePictures{renderer, renderer});
+    for (CrossLine& line : cross) {
+      line.mapper->SetInputConnection(line.ends->GetOutputPort());
+      for (vtkActor* actor : {line.before.Get(), line.behind.Get()}) {
+        actor->SetMapper(line.mapper);
+        actor->GetProperty()->SetColor(kCrossColour[0], kCrossColour[1], kCrossColour[2]);
+        actor->GetProperty()->LightingOff();
+        actor->GetProperty()->SetLineWidth(kCrossWidth_px);
+      }
+      line.behind->GetProperty()->SetOpacity(kCrossBehind);
+      renderer->AddActor(line.before);
+      layer->add(line.behind, 0);
+    }
+    marker.show(true);
+  }
+  Impl(const Impl&) = delete;
+  Impl& operator=(const Impl&) = delete;
+  ~Impl() {
+    layer.reset();
+    window.RemoveRenderer(renderer);
+  }
+
+  struct CrossLine {
+    vtkNew<vtkLineSource> ends;
+    vtkNew<vtkPolyDataMapper> mapper;
+    vtkNew<vtkActor> before, behind;  // hidden by the surface, and drawn over it
+  };
+
+  vtkRenderWindow& window;
+  vtkNew<vtkRenderer> renderer;
+  BoneActors bone{*renderer};
+  SoftTissue soft{*renderer};
+  StatusText status{*renderer};
+  OrientationMarker marker{window};
+  std::optional<LayerAbove> layer;
+  std::array<CrossLine, 3> cross;
+};
+
+SolidScene::SolidScene(vtkRenderWindow& window) : impl_(std::make_unique<Impl>(window)) {}
+
+SolidScene::~SolidScene() = default;
+
+void SolidScene::show_surface(const Mesh& mesh) {
+  if (!impl_->bone.show({}, mesh)) return;
+  impl_->bone.remove();
+  impl_->bone.add();
+}
+
+void SolidScene::show_soft_tissue(const VoxelGrid& grid, std::span<const std::int16_t> hu) {
+  hu.empty() ? impl_->soft.hide() : impl_->soft.show(grid, hu);
+}
+
+bool SolidScene::has_soft_tissue() const { return impl_->soft.shown(); }
+
+void SolidScene::show_cross(const VoxelGrid& grid, const std::array<int, 3>& voxel) {
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    Vec3 first(voxel[0], voxel[1], voxel[2]), last = first;
+    first[static_cast<int>(axis)] = -0.5;
+    last[static_cast<int>(axis)] = grid.dims[axis] - 0.5;
+    const Vec3 from = grid.origin_mm + grid.axes_mm * first, to = grid.origin_mm + grid.axes_mm * last;
+    impl_->cross[axis].ends->SetPoint1(from.x(), from.y(), from.z());
+    impl_->cross[axis].ends->SetPoint2(to.x(), to.y(), to.z());
+  }
+}
+
+void SolidScene::show_notice(const std::string& notice) { impl_->status.show({}, notice); }
+
+std::optional<Vec3> SolidScene::surface_at(int x_px, int y_px) const {
+  return impl_->bone.surface_at(x_px, impl_->window.GetActualSize()[1] - 1 - y_px);
+}
+
+void SolidScene::look(const CameraView& view) { set_view(*impl_->renderer->GetActiveCamera(), view); }
+
+CameraView SolidScene::camera() const { return view_of(*impl_->renderer->GetActiveCamera()); }
+
+void SolidScene::draw(bool coarse) {
+  impl_->soft.set_coarse(coarse);
+  impl_->marker.follow(camera());
+  impl_->layer->place(true, false);
+  impl_->renderer->ResetCameraClippingRange();
+  impl_->window.Render();
+  impl_->window.WaitForCompletion();
+}
+
+Image SolidScene::image() const { return image_of(impl_->window); }
+
+}  // namespace osteon
