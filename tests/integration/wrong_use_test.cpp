@@ -660,7 +660,7 @@ TEST_F(WrongUse, ARoomThatComesBackWithAnotherCaseEndsInOneSentence) {
   EXPECT_TRUE(until([&] { return label("connection") == "Connection lost, trying again"; })) << problem();
   server = serve(other, address.toStdString());
   EXPECT_EQ(refused(),
-            "the server at " + address.toStdString() + " now has another case: start the viewer anew to see it");
+            "the server at " + address.toStdString() + " now has another case: join the room again to see it");
   window_->join({address, {}, {}, {}});
   EXPECT_TRUE(until([&] { return view_->surface_shown(); })) << "it can be seen at once: " << problem();
 }

@@ -42,7 +42,7 @@ class ServerField final : public FieldSource {
     const wire::JoinedRoom room = options_.room();
     // The leaves of another case do not belong to the bone that was fetched.
     if (room.case_hash != fetched_)
-      return {{ErrorCode::unsupported, "the server now has another case: start the viewer anew to see it"}, true};
+      return {{ErrorCode::unsupported, "the server now has another case: join the room again to see it"}, true};
     v1::WatchFieldRequest request;
     request.set_author(room.author.value);
     request.set_kernel_version(kKernelVersion);

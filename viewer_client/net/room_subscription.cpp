@@ -246,7 +246,7 @@ Result<void> RoomSubscription::Impl::rejoin() {
     if (again) {
       if (newest_join().case_hash == case_before) return {};
       return failure(ErrorCode::unsupported,
-                     "the server at " + options.address + " now has another case: start the viewer anew to see it");
+                     "the server at " + options.address + " now has another case: join the room again to see it");
     }
     if (again.error().code != ErrorCode::unavailable || !options.keep_trying) return again;
   } while (!stopping());

@@ -97,7 +97,7 @@ def c_arm(run):
     """Simulated operators drill one hole each, every second one beside a C-arm that is live. Missed ticks come in
     bursts when the host suspends a virtual machine, so their scatter is taken from the pairs if that is larger than
     the scatter of counts."""
-    pairs = 12 if run.soak else 4
+    pairs = 16 if run.soak else 8
     run.say(f"{2 * pairs} holes, half of them with a live C-arm")
     runs = json.loads(run.output("osteon-c-arm-ticks", pairs, progress=True))["runs"]
     run.tables.append((
