@@ -46,11 +46,8 @@ struct SoftTissue::Impl {
     look->SetScalarOpacityUnitDistance(1.0);
     look->SetColor(colour);
     look->SetInterpolationTypeToLinear();
-    look->ShadeOn();
-    // Most of the light is ambient: inside muscle there is no direction in which the HU change.
-    look->SetAmbient(0.7);
-    look->SetDiffuse(0.45);
-    look->SetSpecular(0.1);
+    // VTK's shading is black inside muscle, where the HU change in no direction.
+    look->ShadeOff();
     mapper->SetBlendModeToComposite();
     mapper->AutoAdjustSampleDistancesOff();
     volume->SetMapper(mapper);

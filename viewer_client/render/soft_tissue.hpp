@@ -17,7 +17,7 @@ class SoftTissue {
   explicit SoftTissue(vtkRenderer& renderer);
   ~SoftTissue();
 
-  // Copies the HU: columns fastest, then rows, then slices. VTK takes 5 bytes for each voxel in all.
+  // Copies the HU: columns fastest, then rows, then slices. Without shading, VTK needs little more.
   void show(const VoxelGrid& grid, std::span<const std::int16_t> hu);
   void hide();
   [[nodiscard]] bool shown() const;
