@@ -158,12 +158,14 @@ TEST_F(ImagingEditsTest, FilterBoxAndBrushMakeTheBoneOfTheSameList) {
 // The pixel of a ball's middle, from the picture alone. Lines and letters over it do not move a median.
 QPoint middle_of_ball(ImagingPlane& axial, int side) {
   const QImage seen = axial.grab().toImage();
+  constexpr int kBeside_px = 10;  // a bright gap, and the frame of the focus
+  const int width = axial.findChild<QSlider*>()->x() - kBeside_px;
   std::vector<int> columns, rows;
   for (int y = 0; y < seen.height(); ++y)
-    for (int x = 0; x < seen.width(); ++x) {
+    for (int x = kBeside_px; x < width; ++x) {
       // The patient's left is to the right.
       const QColor colour(seen.pixel(x, y));
-      if ((x > seen.width() / 2) != (side > 0) || colour.value() < 120) continue;
+      if ((x > width / 2) != (side > 0) || colour.value() < 120) continue;
       columns.push_back(x);
       rows.push_back(y);
     }

@@ -141,7 +141,7 @@ TEST_F(SendingTest, AServerThatIsKilledInTheMiddleIsOneSentenceAndTheCaseStays) 
   ASSERT_TRUE(until([&] { return at_rest(); })) << words();
   EXPECT_NE(words().find(address_), std::string::npos) << words();
   EXPECT_EQ(test::content(sent() / "bone.vdb"), before);
-  start_server({"--uploads", uploads_.path()});
+  start_server({"--uploads", uploads_.path(), "--rooms", rooms_.path()});
   send(address_);
   ASSERT_TRUE(until([&] { return at_rest(); })) << words();
   EXPECT_EQ(words(), address_ + " has the case now.");
