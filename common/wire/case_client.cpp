@@ -2,11 +2,14 @@
 
 #include <grpcpp/grpcpp.h>
 
+#include <cerrno>
 #include <chrono>
 #include <fstream>
+#include <optional>
 #include <system_error>
 
 #include "common/wire/convert.hpp"
+#include "common/wire/room_client.hpp"
 #include "osteon/v1/cases.grpc.pb.h"
 #include "osteon/v1/rooms.grpc.pb.h"
 
@@ -67,14 +70,17 @@ class WatchedCall {
 };
 
 // Of a call that began when the server was there. A server that ends gives up its calls.
-Error error_of_upload(const grpc::Status& status) {
+// `remedy`: what to do when it is lost.
+Error error_of_call(const grpc::Status& status, const std::string& remedy) {
+  if (std::optional<Error> http = error_of_http(status.error_message(), "the server")) return std::move(*http);
   switch (status.error_code()) {
     case grpc::StatusCode::UNAVAILABLE:
     case grpc::StatusCode::UNKNOWN:
     case grpc::StatusCode::CANCELLED:
       return {ErrorCode::unavailable,
-              "the connection to the server was lost before it had the case; see whether the server runs, and send the "
-              "case again"};
+              "the connection to the server was lost before it answered; see whether the server runs, and " + remedy};
+    case grpc::StatusCode::UNIMPLEMENTED:
+      return {ErrorCode::unsupported, "the server is not an Osteon server of this version"};
     default:
       return error_of_answer(status);
   }
@@ -123,8 +129,12 @@ Result<StoredCaseLine> upload_case(const std::shared_ptr<grpc::Channel>& channel
                                    const KeepGoing& keep_going) {
   std::error_code error;
   const std::uint64_t size = std::filesystem::file_size(archive, error);
+  errno = 0;
   std::ifstream in(archive, std::ios::binary);
-  if (error || !in) return failure(ErrorCode::not_found, archive.string() + " cannot be read: " + error.message());
+  if (!error && !in) error = std::error_code(errno, std::generic_category());
+  if (error)
+    return failure(ErrorCode::not_found, archive.string() + " cannot be read: " + error.message() +
+                                             "; see whether it is there and you may read it");
   v1::UploadCaseResponse response;
   const auto stub = v1::CaseService::NewStub(channel);
   WatchedCall call(keep_going);
@@ -152,7 +162,7 @@ Result<StoredCaseLine> upload_case(const std::shared_ptr<grpc::Channel>& channel
   (void)call.wait(fraction());
   if (cut_short) return failure(ErrorCode::not_found, archive.string() + " cannot be read to its end; send it again");
   if (call.stopped() && !status.ok()) return stopped_while("sending the case");
-  if (!status.ok()) return tl::unexpected(error_of_upload(status));
+  if (!status.ok()) return tl::unexpected(error_of_call(status, "send the case again"));
   Result<StoredCaseLine> line = line_of(response.stored());
   if (line) line->known = response.known();
   return line;
@@ -173,7 +183,7 @@ Result<void> create_room_with(const std::shared_ptr<grpc::Channel>& channel, con
   reader->Finish(&response, &status, nullptr);
   (void)call.wait(0.0);
   if (call.stopped() && !status.ok()) return stopped_while("opening the room");
-  if (!status.ok()) return tl::unexpected(error_of_answer(status));
+  if (!status.ok()) return tl::unexpected(error_of_call(status, "join the room: it may be open"));
   return {};
 }
 

@@ -34,8 +34,8 @@ struct StoredCaseLine {
 [[nodiscard]] Result<std::vector<StoredCaseLine>> list_cases(const std::shared_ptr<grpc::Channel>& channel);
 
 // Sends a zip archive of a case, and waits until the server has checked and stored it. `keep_going` gets the fraction
-// that is sent, also while the server checks, at least ten times a second; false cancels the upload, of which the
-// server keeps nothing. Errors: those of list_cases(), not_found (the archive cannot be read), cancelled.
+// that is sent, also while the server checks, ten times a second unless the disk is slow; false cancels the upload, of
+// which the server keeps nothing. Errors: those of list_cases(), not_found (the archive cannot be read), cancelled.
 [[nodiscard]] Result<StoredCaseLine> upload_case(const std::shared_ptr<grpc::Channel>& channel,
                                                  const std::filesystem::path& archive, const KeepGoing& keep_going);
 

@@ -105,20 +105,6 @@ bool is_server_address(const std::string& address) {
   return at && at->port > 0 && address.find('/') == std::string::npos;
 }
 
-// Translates gRPC's text for a plain HTTP answer, from a proxy or from a server without gRPC.
-std::optional<Error> error_of_http(const std::string& said, const std::string& server) {
-  constexpr std::string_view kStatus = "http2 header with status: ";
-  const std::size_t at = said.find(kStatus);
-  if (at == std::string::npos) return {};
-  const std::string status = said.substr(at + kStatus.size());
-  if (status.starts_with("502") || status.starts_with("503") || status.starts_with("504"))
-    return Error{ErrorCode::unavailable,
-                 server + " is a proxy that reaches no Osteon server behind it (HTTP " + status +
-                     "); see whether osteon-server runs there, with the proxy's --proxy-socket"};
-  return Error{ErrorCode::unsupported, server + " is no Osteon server, but another one (HTTP " + status +
-                                           "); give with --server the port that osteon-server printed"};
-}
-
 Error error_of(const grpc::Status& status, const std::string& server) {
   if (std::optional<Error> http = error_of_http(status.error_message(), server)) return std::move(*http);
   switch (status.error_code()) {
@@ -217,6 +203,22 @@ Result<JoinedRoom> ask_to_join(JoinedRoom room, const v1::JoinRequest& request, 
 }
 
 }  // namespace
+
+std::optional<Error> error_of_http(const std::string& said, const std::string& server) {
+  constexpr std::string_view kStatus = "http2 header with status: ";
+  const std::size_t at = said.find(kStatus);
+  if (at == std::string::npos) return {};
+  const std::string status = said.substr(at + kStatus.size());
+  if (status.starts_with("502") || status.starts_with("503") || status.starts_with("504"))
+    return Error{ErrorCode::unavailable,
+                 server + " is a proxy that reaches no Osteon server behind it (HTTP " + status +
+                     "); see whether osteon-server runs there, with the proxy's --proxy-socket"};
+  if (status.starts_with("413"))
+    return Error{ErrorCode::exhausted, "a proxy before the server takes nothing as large (HTTP " + status +
+                                           "); ask its operator for a higher limit"};
+  return Error{ErrorCode::unsupported, server + " is no Osteon server, but another one (HTTP " + status +
+                                           "); give with --server the port that osteon-server printed"};
+}
 
 Result<std::shared_ptr<grpc::Channel>> reach_server(const std::string& address, ClientKind kind,
                                                     std::chrono::milliseconds patience,

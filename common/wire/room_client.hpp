@@ -18,6 +18,10 @@ class Channel;
 
 namespace osteon::wire {
 
+// Translates gRPC's text for a plain HTTP answer, from a proxy or from a server without gRPC. `server`: how messages
+// name it. Nothing: it is no such text.
+[[nodiscard]] std::optional<Error> error_of_http(const std::string& said, const std::string& server);
+
 enum class ClientKind { haptic = 1, viewer = 2, audio = 3, console = 4 };
 
 struct JoinedRoom {

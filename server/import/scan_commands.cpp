@@ -138,7 +138,7 @@ void add_scan_commands(CLI::App& app, std::vector<Command>& commands) {
   commands.push_back({islands, [found](const StopSignal& stop) { return run_islands(*found, stop); }});
 
   const auto lines = std::make_shared<ShownScan>();
-  CLI::App* edges = app.add_subcommand("edges", "Find the edges of a scan after Canny, and write where they lie");
+  CLI::App* edges = app.add_subcommand("edges", "Find the edges of a scan by Canny's method, and write where they lie");
   add_scan_options(*edges, lines->scan);
   edges->add_option("FILE", lines->out, "File to write: .nrrd, with 1 for each voxel of an edge, and 0 elsewhere")
       ->required();

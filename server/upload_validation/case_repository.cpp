@@ -128,6 +128,7 @@ Result<StoredCase> CaseRepository::keep(std::unique_ptr<Upload> upload, const st
   if (case_bytes() + bytes > quota_.kept_bytes)
     return failure(ErrorCode::exhausted, "the server's folder of cases has no " + std::to_string(bytes) +
                                              " bytes left for this one; ask the operator to delete some");
+  if (stop && stop()) return failure(ErrorCode::cancelled, "the case is not kept, since its sender has cancelled");
   fs::rename(from, to, error);
   if (error) return disk(to, error.message());
   return stored;

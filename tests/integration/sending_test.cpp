@@ -4,9 +4,9 @@
 #include <QDialog>
 #include <QLabel>
 #include <QLineEdit>
-#include <QProgressBar>
 #include <QPushButton>
 #include <QSettings>
+#include <QStatusBar>
 #include <QTest>
 #include <algorithm>
 #include <csignal>
@@ -24,6 +24,7 @@
 #include "tests/support/process.hpp"
 #include "tests/support/temp_dir.hpp"
 #include "viewer_client/desktop/language.hpp"
+#include "viewer_client/desktop/library.hpp"
 
 namespace osteon {
 namespace {
@@ -78,10 +79,7 @@ class SendingTest : public test::WindowBench {
     QTest::mouseClick(&part<QPushButton>("send_case"), Qt::LeftButton);
   }
   [[nodiscard]] bool at_rest() const { return part<QPushButton>("send_case").isEnabled(); }
-  [[nodiscard]] bool half_sent() const {
-    const auto& progress = part<QProgressBar>("send_progress");
-    return words() == "The case is being sent" && progress.maximum() == 100 && progress.value() >= 2;
-  }
+  [[nodiscard]] bool half_sent() const { return words() == "The case is being sent" && !fs::is_empty(uploads_.path()); }
   // No case, but as much data as takes a while.
   [[nodiscard]] static fs::path large_file() {
     fs::path file = desk_->temp() / "large.osteon";
@@ -111,6 +109,7 @@ TEST_F(SendingTest, TheServerGetsTheSameCaseAndOpensARoomWithIt) {
   const auto kept = Case::load(uploads_ / hash);
   ASSERT_TRUE(kept) << kept.error().message;
   EXPECT_EQ(to_hex(kept->hash()), hash);
+  EXPECT_EQ(part<QLineEdit>("new_room").text(), "") << "another case gets another room";
   EXPECT_EQ(QSettings().value("join/room").toString(), "ward") << "where one joins next";
 
   send(address_);
@@ -152,16 +151,47 @@ TEST_F(SendingTest, ACancelledUploadLeavesNothingOnTheServer) {
   window_->send_case(large);
   send(address_);
   ASSERT_TRUE(until([&] { return half_sent() || at_rest(); })) << words();
+  server_->signal(SIGSTOP);  // on a fast machine it would have all of it soon
+  ASSERT_FALSE(at_rest()) << words();
   // Escape closes no dialog that is at work.
   QTest::keyClick(&part<QDialog>("send_dialog"), Qt::Key_Escape);
   ASSERT_TRUE(until([&] { return at_rest(); })) << words();
-  EXPECT_EQ(words(), "Cancelled. The server keeps nothing, and the case here stays.");
+  EXPECT_EQ(words(), "Cancelled. The server stored nothing, and the case here stays.");
   EXPECT_TRUE(part<QDialog>("send_dialog").isVisible());
+  EXPECT_FALSE(fs::is_empty(uploads_.path())) << "the server stands still";
+  server_->signal(SIGCONT);
   EXPECT_TRUE(until([&] { return fs::is_empty(uploads_.path()); }));
   EXPECT_TRUE(server_->running());
   QTest::keyClick(&part<QDialog>("send_dialog"), Qt::Key_Escape);
   EXPECT_FALSE(part<QDialog>("send_dialog").isVisible());
   fs::remove(large);
+}
+
+// The server stands still, so the packed case waits for the connection.
+TEST_F(SendingTest, AClosedWindowWaitsForTheCaseAndThenGivesUp) {
+  const fs::path scratch = cases_folder() / (".partial-send-" + std::to_string(QCoreApplication::applicationPid()));
+  const auto close_while_it_connects = [&] {
+    server_->signal(SIGSTOP);
+    window_->send_case(sent());
+    send(address_);
+    ASSERT_TRUE(until([&] { return words().starts_with("Connecting"); })) << words();
+    EXPECT_EQ(fs::status(scratch).permissions(), fs::perms::owner_all);
+    EXPECT_FALSE(window_->close());
+    EXPECT_TRUE(window_->isVisible());
+    const std::string said = window_->statusBar()->toolTip().toStdString();
+    EXPECT_NE(said.find("closes when the case is sent"), std::string::npos) << said;
+  };
+  close_while_it_connects();
+  EXPECT_TRUE(window_->close());
+  EXPECT_FALSE(fs::exists(scratch));
+  server_->signal(SIGCONT);
+  EXPECT_TRUE(fs::is_empty(uploads_.path()));
+
+  begin();
+  close_while_it_connects();
+  server_->signal(SIGCONT);
+  EXPECT_TRUE(until([&] { return !window_->isVisible(); })) << words();
+  EXPECT_FALSE(fs::is_empty(uploads_.path()));
 }
 
 TEST_F(SendingTest, ARefusalSaysWhyAndSendingGoesOn) {

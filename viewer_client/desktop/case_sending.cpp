@@ -40,7 +40,7 @@ void CaseSending::cancel() {
 }
 
 void CaseSending::fail(const QString& sentence) {
-  events_.failed(cancelled_ ? tr("Cancelled. The server keeps nothing, and the case here stays.") : sentence);
+  events_.failed(cancelled_ ? tr("Cancelled. The server stored nothing, and the case here stays.") : sentence);
 }
 
 // Only the user may read the file: it has a patient's scan.
@@ -77,21 +77,30 @@ void CaseSending::in_gui(std::function<void()> call) {
 }
 
 void CaseSending::show(Stage stage) {
-  if (std::exchange(shown_, stage) != stage) in_gui([this, stage] { events_.stage(stage); });
+  if (std::exchange(shown_, stage) != stage)
+    in_gui([this, stage] {
+      if (!cancelled_) events_.stage(stage);
+    });
 }
 
 KeepGoing CaseSending::keep_going() {
   return [this](double fraction) {
+    if (cancelled_) return false;
     const int percent = static_cast<int>(100.0 * fraction);
     if (shown_ != Stage::opening) show(fraction >= 1.0 ? Stage::checking : Stage::sending);
     if (shown_ == Stage::sending && std::exchange(percent_, percent) != percent)
       in_gui([this, percent] { events_.progress(percent); });
-    return !cancelled_.load();
+    return true;
   };
 }
 
 void CaseSending::work(const std::filesystem::path& archive) {
-  const auto failed = [this](const Error& error) { in_gui([this, why = words_of(error)] { fail(why); }); };
+  const auto failed = [this](const Error& error) {
+    in_gui([this, why = words_of(error), has_all = shown_ == Stage::checking] {
+      cancelled_&& has_all ? events_.failed(tr("Cancelled. A server that had already checked the case may have it."))
+                           : fail(why);
+    });
+  };
   // As the administrator's program: while the server checks, a slow answer is awaited.
   const auto channel = wire::reach_server(
       to_.address.toStdString(), wire::ClientKind::haptic, kReachPatience, [this] { return cancelled_.load(); },
@@ -115,7 +124,7 @@ void CaseSending::open_room(const std::shared_ptr<grpc::Channel>& channel, const
       events_.sent(tr("%1 has the case, and the room %2 is open with it.").arg(to_.address, to_.room), to_.room);
     });
   in_gui([this, why = words_of(opened.error())] {
-    events_.failed(cancelled_ ? tr("Cancelled. %1 has the case already.").arg(to_.address)
+    events_.failed(cancelled_ ? tr("Cancelled. %1 has the case, and the room may be open.").arg(to_.address)
                               : tr("%1 has the case, but did not open the room: %2").arg(to_.address, why));
   });
 }

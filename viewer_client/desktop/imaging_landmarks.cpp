@@ -40,12 +40,16 @@ ImagingLandmarks::ImagingLandmarks(Events events, QWidget* parent) : QWidget(par
   list_ = new QListWidget;
   list_->setObjectName("landmarks");
   list_->setAccessibleName(tr("Landmarks"));
-  list_->setToolTip(tr("A click shows one, and the next click with Landmark moves it. F2 renames it."));
+  list_->setToolTip(tr("A click or Enter shows one, and the next click with Landmark moves it. F2 renames it."));
   list_->setFixedHeight(kLandmarkList_px);
   list_->setHorizontalScrollBarPolicy(Qt::ScrollBarAlwaysOff);
   list_->setTextElideMode(Qt::ElideMiddle);
   connect(list_, &QListWidget::itemClicked, this, [this](QListWidgetItem* item) { show_item(item); });
-  connect(list_, &QListWidget::currentItemChanged, this, [this](QListWidgetItem* item) { show_item(item); });
+  connect(list_, &QListWidget::itemActivated, this, [this](QListWidgetItem* item) { show_item(item); });
+  // The keyboard's focus alone makes the first one the current one: that chooses no name.
+  connect(list_, &QListWidget::currentItemChanged, this, [this](QListWidgetItem* item) {
+    if (!filling_) set_enabled(*remove_, item != nullptr, tr("Choose a landmark in the list first."));
+  });
   connect(list_, &QListWidget::itemChanged, this, [this](QListWidgetItem* item) {
     if (filling_) return;
     const std::string before = item->data(kLandmarkName).toString().toStdString();
@@ -76,9 +80,6 @@ ImagingLandmarks::ImagingLandmarks(Events events, QWidget* parent) : QWidget(par
 std::string ImagingLandmarks::name() const { return name_->currentText().trimmed().toStdString(); }
 
 void ImagingLandmarks::show_item(const QListWidgetItem* item) {
-  if (filling_) return;
-  set_enabled(*remove_, item != nullptr, tr("Choose a landmark in the list first."));
-  if (item == nullptr) return;
   name_->setEditText(item->text());
   events_.show(item->data(kLandmarkName).toString().toStdString());
 }

@@ -97,8 +97,9 @@ ImagingSteps::Events ImagingPage::step_events() {
           [this](VoxelFile<std::uint8_t> edges) { show_edges(std::move(edges)); },
           [this](const std::filesystem::path& bone) {
             events_.busy(false);
-            end_work(show_report(bone));
-            events_.made(bone);
+            const QString said = show_report(bone);
+            end_work(said);
+            events_.made(bone, said);
           },
           [this](const QString& sentence) {
             events_.busy(false);
@@ -301,6 +302,7 @@ void ImagingPage::open_source(const QString& source) {
   show_edges({});
   scene_.look = {};
   scene_.seeds.clear();
+  scene_.landmarks.clear();
   tools_->reset();
   choice_->follow({});
   landmarks_->follow({});

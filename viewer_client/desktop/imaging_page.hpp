@@ -41,7 +41,8 @@ class ImagingPage : public QWidget {
  public:
   struct Events {
     std::function<void(bool busy)> busy;  // a case is being made
-    std::function<void(const std::filesystem::path& bone)> made;
+    // `said`: where the report is, if there is one.
+    std::function<void(const std::filesystem::path& bone, const QString& said)> made;
     std::function<void()> leave;
   };
   explicit ImagingPage(Events events, QWidget* parent = nullptr);

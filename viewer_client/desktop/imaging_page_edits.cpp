@@ -227,6 +227,7 @@ void ImagingPage::end_drag(bool keep) {
   refresh_look();
   refresh_planes();
   if (!keep) return;
+  take_threshold();
   const ScanGeometry& scan = scene_.scan.geometry;
   ImagingEdits edits = history_.now();
   const int under = bone_at(drag->first()), bone = bone_of_drag(choice_->bone(), under, edits);
@@ -289,7 +290,8 @@ void ImagingPage::follow_edits() {
   if (!current()) {
     scene_.look.threshold_hu = edits.threshold_hu;
     refresh_look();
-    find_islands();
+    // A landmark changes nothing of a search that is at work or was cancelled.
+    if (wanted() != searched_) find_islands();
   } else {
     scene_.look.threshold_hu.reset();
     refresh_list();

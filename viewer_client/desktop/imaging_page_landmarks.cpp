@@ -12,17 +12,20 @@ ImagingLandmarks* ImagingPage::make_landmarks() {
   return new ImagingLandmarks(
       {[this](const std::string& name) { show_landmark(name); },
        [this](const std::string& name) {
+         take_threshold();
          ImagingEdits edits = history_.now();
          remove_landmark(edits, name);
          take(std::move(edits), 0);
        },
        [this](const std::string& name, const std::string& other) {
+         take_threshold();
          ImagingEdits edits = history_.now();
          if (!rename_landmark(edits, name, other)) {
            words_->setText(tr("No landmark can be called that. Write up to 60 bytes that no other landmark has."));
            return landmarks_->follow(edits);
          }
          take(std::move(edits), 0);
+         landmarks_->follow(history_.now());  // also if nothing changed
        }});
 }
 

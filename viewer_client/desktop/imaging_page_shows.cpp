@@ -20,14 +20,15 @@ QCheckBox* ImagingPage::make_report_choice() {
 QString ImagingPage::show_report(const std::filesystem::path& bone) const {
   const std::filesystem::path page = report_folder(bone) / "report.html";
   if (!is_file(page)) return tr("The bone is made.");
-  QDesktopServices::openUrl(QUrl::fromLocalFile(text_of(page)));
+  if (!QDesktopServices::openUrl(QUrl::fromLocalFile(text_of(page))))
+    return tr("The bone is made. No program opens its report %1.").arg(text_of(page));
   return tr("The bone is made. Its report is in %1.").arg(text_of(page));
 }
 
 QCheckBox* ImagingPage::make_edge_choice() {
   auto* choice = new QCheckBox(tr("Ed&ges"));
   choice->setObjectName("edges");
-  choice->setToolTip(tr("Lines where the HU change most, after Canny"));
+  choice->setToolTip(tr("Lines where the HU change most, by Canny's method"));
   connect(choice, &QCheckBox::toggled, this, [this](bool on) { choose_edges(on); });
   return choice;
 }
@@ -36,18 +37,17 @@ void ImagingPage::choose_edges(bool on) {
   if (!on) return show_edges({});
   if (!scene_.open() || steps_.busy()) return show_edges({});
   show_work(tr("Finding the edges"));
-  steps_.find_edges();
+  steps_.find_edges(scene_.scan.geometry);
   enable_parts();
 }
 
 void ImagingPage::show_edges(VoxelFile<std::uint8_t> edges) {
   const bool found = !edges.values.empty();
-  const bool fits = found && scene_.open() && edges.geometry.dims == scene_.scan.geometry.dims;
-  scene_.look.edges = fits ? std::move(edges) : VoxelFile<std::uint8_t>();
+  scene_.look.edges = std::move(edges);
   const QSignalBlocker quiet(edges_);
-  edges_->setChecked(fits);
+  edges_->setChecked(found);
   refresh_planes();
-  if (fits) end_work(tr("The edges of the scan are shown."));
+  if (found) end_work(tr("The edges of the scan are shown."));
 }
 
 }  // namespace osteon

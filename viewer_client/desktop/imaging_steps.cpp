@@ -92,7 +92,10 @@ ImagingSteps::~ImagingSteps() {
   const bool unfinished = maker_ != nullptr;
   maker_.reset();
   std::error_code ignored;
-  if (unfinished && !is_case(out_)) std::filesystem::remove(edits_of(out_), ignored);
+  if (unfinished && !is_case(out_)) {
+    std::filesystem::remove(edits_of(out_), ignored);
+    std::filesystem::remove_all(report_folder(out_), ignored);
+  }
   std::filesystem::remove_all(scratch_, ignored);
 }
 
@@ -240,14 +243,16 @@ void ImagingSteps::read_islands(const QString& said, const ScanGeometry& scan) {
       });
 }
 
-void ImagingSteps::find_edges() {
+void ImagingSteps::find_edges(const ScanGeometry& scan) {
   cancelled_ = false;
   QFile::remove(scratch_file(kEdgeFile));
-  start({"edges", scratch_file(shown_file_), scratch_file(kEdgeFile)}, [this](const QString&) {
+  start({"edges", scratch_file(shown_file_), scratch_file(kEdgeFile)}, [this, scan](const QString&) {
     in_background([this] { edges_ = read_number_file(scratch_ / kEdgeFile); },
-                  [this] {
+                  [this, scan] {
                     auto edges = std::exchange(edges_, VoxelFile<std::uint8_t>());
                     if (!edges) return fail(QString::fromStdString(edges.error().message));
+                    if (edges->geometry.dims != scan.dims)
+                      return fail(tr("The edges are not those of the scan. Find them again."));
                     events_.edges(std::move(*edges));
                   });
   });
@@ -271,6 +276,8 @@ void ImagingSteps::make(const ImagingEdits& edits, bool with_report) {
                                                          [this, file](const QString& sentence) {
                                                            maker_.release()->deleteLater();
                                                            QFile::remove(file);  // the page has the edits
+                                                           std::error_code ignored;
+                                                           std::filesystem::remove_all(report_folder(out_), ignored);
                                                            fail(sentence);
                                                          }});
   maker_->start();

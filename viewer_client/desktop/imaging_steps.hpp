@@ -59,7 +59,7 @@ class ImagingSteps : public QObject {
   // The islands of the filtered scan, by the edits' threshold and box.
   void find(const ScanGeometry& scan, const ImagingEdits& edits);
   // The edges of the filtered scan: tells `edges`.
-  void find_edges();
+  void find_edges(const ScanGeometry& scan);
   // The case has the edit list beside it, in a file NAME.edits.yaml. With a report it has that in report_folder(), too.
   void make(const ImagingEdits& edits, bool with_report);
 

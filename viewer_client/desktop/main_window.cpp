@@ -738,7 +738,14 @@ void MainWindow::closeEvent(QCloseEvent* event) {
     say(tr("The window closes when the bone is saved. Close it once more to give that up."));
     return event->ignore();
   }
+  const bool sends = sender_ && sender_->sending();
+  if (sends && !closes_when_sent_) {
+    closes_when_sent_ = true;
+    say(tr("The window closes when the case is sent. Close it once more to give that up."));
+    return event->ignore();
+  }
   saver_.reset();
+  if (sends) sender_.reset();
   QSettings settings;
   settings.setValue("window/geometry", saveGeometry());
   settings.setValue("window/state", room_layout_.isEmpty() ? saveState() : room_layout_);

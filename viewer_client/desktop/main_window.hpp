@@ -120,6 +120,8 @@ class MainWindow : public QMainWindow {
   void save_bone_as();
   // The open bone, or else one that the user chooses.
   void choose_case_to_send();
+  // A case is being sent: says so, and shows its dialog.
+  bool sends_already();
   void choose_room();
   void enter_room(const RoomAddress& room);
   void leave_room();
@@ -187,7 +189,7 @@ class MainWindow : public QMainWindow {
   std::vector<RoomSeq> undo_points_;  // before each push and each item, oldest first
   std::string first_tool_;            // that the hand takes in the next room; empty: none
   bool watching_ = false;
-  bool closes_when_saved_ = false;
+  bool closes_when_saved_ = false, closes_when_sent_ = false;
   std::string placing_;  // the item that the next click places
   QString address_, room_name_;
   QString own_name_;  // of the user's hand in the room; empty: none

@@ -122,7 +122,10 @@ void MainWindow::process_images(const QString& source) {
 
 void MainWindow::make_imaging_page() {
   imaging_ = new ImagingPage({[this](bool busy) { enable_opening(!busy); },
-                              [this](const std::filesystem::path& bone) { practise(bone); },
+                              [this](const std::filesystem::path& bone, const QString& said) {
+                                practise(bone);
+                                say(said);
+                              },
                               [this] { pages_->setCurrentWidget(start_); }});
   pages_->addWidget(imaging_);
   connect(pages_, &QStackedWidget::currentChanged, this, [this] { lay_out_page(); });
@@ -155,15 +158,29 @@ void MainWindow::choose_case() {
   is_file(chosen) ? open_case_file(chosen) : practise(chosen);
 }
 
+bool MainWindow::sends_already() {
+  if (!sender_ || !sender_->sending()) return false;
+  say(tr("Another case is being sent. Try again when that is done."));
+  sender_->show();
+  sender_->raise();
+  sender_->activateWindow();
+  return true;
+}
+
 void MainWindow::choose_case_to_send() {
+  if (sends_already()) return;
   const std::filesystem::path chosen =
       opened_ ? opened_->bone : chosen_case(tr("The case to send"), text_of(cases_folder()));
   if (!chosen.empty()) send_case(chosen);
 }
 
 void MainWindow::send_case(const std::filesystem::path& what) {
-  if (!sender_ || !sender_->sending())
-    sender_ = std::make_unique<SendDialog>(what, is_file(what) ? text_of(what.filename()) : case_title(what), this);
+  if (sends_already()) return;
+  const auto ended = [this](bool sent) {
+    if (std::exchange(closes_when_sent_, false) && sent) close();
+  };
+  sender_ =
+      std::make_unique<SendDialog>(what, is_file(what) ? text_of(what.filename()) : case_title(what), ended, this);
   sender_->show();
   sender_->raise();
   sender_->activateWindow();

@@ -12,8 +12,9 @@
 
 namespace osteon {
 
-SendDialog::SendDialog(std::filesystem::path what, const QString& title, QWidget* parent)
-    : QDialog(parent), what_(std::move(what)) {
+SendDialog::SendDialog(std::filesystem::path what, const QString& title, std::function<void(bool sent)> ended,
+                       QWidget* parent)
+    : QDialog(parent), what_(std::move(what)), ended_(std::move(ended)) {
   setObjectName("send_dialog");
   setWindowTitle(tr("Send %1 to a server").arg(title));
   auto* all = new QVBoxLayout(this);
@@ -21,7 +22,9 @@ SendDialog::SendDialog(std::filesystem::path what, const QString& title, QWidget
   all->addLayout(form);
   fields_.emplace(*form);
   fields_->add_address();
-  room_ = fields_->add(tr("Room to open with it (empty: none)"), "new_room");
+  room_ = new QLineEdit;  // another case gets another room, so nobody remembers it
+  room_->setObjectName("new_room");
+  form->addRow(tr("Room to open with it (empty: none)"), room_);
   fields_->add_credentials();
   words_ = new QLabel;
   words_->setObjectName("send_words");
@@ -39,6 +42,7 @@ SendDialog::SendDialog(std::filesystem::path what, const QString& title, QWidget
   send_->setDefault(true);
   close_ = buttons->addButton(QDialogButtonBox::Close);
   close_->setObjectName("send_close");
+  close_->setAutoDefault(false);  // a second Enter cancels nothing
   connect(send_, &QPushButton::clicked, this, [this] { send(); });
   connect(close_, &QPushButton::clicked, this, [this] { reject(); });
   all->addWidget(buttons);
@@ -67,9 +71,14 @@ void SendDialog::send() {
                           },
                           [this](const QString& sentence, const QString& room) {
                             if (!room.isEmpty()) remember_field("room", room);  // where "Join a room" goes next
+                            room_->clear();
                             end(sentence);
+                            ended_(true);
                           },
-                          [this](const QString& sentence) { end(sentence); }});
+                          [this](const QString& sentence) {
+                            end(sentence);
+                            ended_(false);
+                          }});
   progress_->show();
   enable_parts();
   sending_->start();
@@ -101,6 +110,7 @@ void SendDialog::end(const QString& sentence) {
 void SendDialog::enable_parts() {
   const QString reason = tr("The case is being sent. Wait for it, or cancel it.");
   fields_->set_enabled(!sending_, reason);
+  set_enabled(*room_, !sending_, reason);
   set_enabled(*send_, !sending_, reason);
   close_->setText(sending_ ? tr("Cancel") : tr("&Close"));
 }

@@ -4,6 +4,7 @@
 #include <QCoreApplication>
 #include <QDialog>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <optional>
 
@@ -22,7 +23,8 @@ class SendDialog : public QDialog {
 
  public:
   // `what`: the folder of a case, or a file with one. `title`: for people.
-  SendDialog(std::filesystem::path what, const QString& title, QWidget* parent);
+  // `ended`: after each sending; `sent`: it went well.
+  SendDialog(std::filesystem::path what, const QString& title, std::function<void(bool sent)> ended, QWidget* parent);
   ~SendDialog() override;
 
   [[nodiscard]] bool sending() const { return sending_ != nullptr; }
@@ -36,6 +38,7 @@ class SendDialog : public QDialog {
   void enable_parts();
 
   std::filesystem::path what_;
+  std::function<void(bool sent)> ended_;
   std::optional<ServerFields> fields_;
   QLineEdit* room_ = nullptr;
   QLabel* words_;

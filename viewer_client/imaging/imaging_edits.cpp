@@ -162,6 +162,7 @@ void put_landmark(ImagingEdits& edits, const std::string& name, const Vec3& at_m
 bool rename_landmark(ImagingEdits& edits, const std::string& name, const std::string& other) {
   const auto found = std::ranges::find(edits.landmarks, name, &MarkedLandmark::name);
   if (found == edits.landmarks.end() || !is_landmark_name(other)) return false;
+  if (other == name) return true;
   if (std::ranges::find(edits.landmarks, other, &MarkedLandmark::name) != edits.landmarks.end()) return false;
   found->name = other;
   return true;

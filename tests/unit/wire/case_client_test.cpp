@@ -32,6 +32,7 @@ class FakeCases final : public v1::CaseService::Service {
     if (!refusal.ok()) return refusal;
     v1::UploadCaseRequest request;
     while (reader->Read(&request)) received += request.data();
+    has_all = !context->IsCancelled();
     while (holds && !context->IsCancelled()) std::this_thread::sleep_for(1ms);
     was_cancelled = context->IsCancelled();
     response->mutable_stored()->set_case_hash(std::string(32, 'h'));
@@ -43,7 +44,7 @@ class FakeCases final : public v1::CaseService::Service {
 
   grpc::Status refusal;
   std::string received;
-  std::atomic<bool> holds{false}, was_cancelled{false};
+  std::atomic<bool> holds{false}, has_all{false}, was_cancelled{false};
 };
 
 class FakeRooms final : public v1::RoomsService::Service {
@@ -111,20 +112,22 @@ TEST_F(CaseClientTest, ARefusalIsTheSentenceOfTheServer) {
       {grpc::StatusCode::FAILED_PRECONDITION, ErrorCode::unavailable},
       {grpc::StatusCode::DEADLINE_EXCEEDED, ErrorCode::unavailable}};
   for (const auto& [said, meant] : meanings) {
-    cases_.refusal = {said, "no room on the shelf; come tomorrow"};
+    cases_.refusal = {said, "the folder of cases is full; ask the operator"};
     const auto stored = upload_case(channel_, archive_, {});
     ASSERT_FALSE(stored);
     EXPECT_EQ(stored.error().code, meant);
-    EXPECT_TRUE(stored.error().message.ends_with("no room on the shelf; come tomorrow")) << stored.error().message;
+    EXPECT_TRUE(stored.error().message.ends_with("the folder of cases is full; ask the operator"))
+        << stored.error().message;
   }
 }
 
 // The server has all and does not answer.
 TEST_F(CaseClientTest, AStopEndsTheCallWhileTheServerChecks) {
   cases_.holds = true;
-  const auto stored = upload_case(channel_, archive_, [](double fraction) { return fraction < 1.0; });
+  const auto stored = upload_case(channel_, archive_, [&](double) { return !cases_.has_all; });
   ASSERT_FALSE(stored);
   EXPECT_EQ(stored.error().code, ErrorCode::cancelled);
+  EXPECT_TRUE(cases_.has_all);
   server_->Shutdown();  // the handler has returned then
   EXPECT_TRUE(cases_.was_cancelled);
 }
@@ -150,6 +153,19 @@ TEST_F(CaseClientTest, AServerThatEndsInTheMiddleIsOneSentence) {
   EXPECT_NE(stored.error().message.find("send the case again"), std::string::npos) << stored.error().message;
 }
 
+TEST_F(CaseClientTest, AProxyAndAnotherServerAreNoLostConnection) {
+  const std::pair<grpc::Status, const char*> meanings[] = {
+      {{grpc::StatusCode::UNKNOWN, "Received http2 header with status: 413"}, "HTTP 413"},
+      {{grpc::StatusCode::UNAVAILABLE, "Received http2 header with status: 502"}, "HTTP 502"},
+      {{grpc::StatusCode::UNIMPLEMENTED, ""}, "not an Osteon server of this version"}};
+  for (const auto& [said, meant] : meanings) {
+    cases_.refusal = said;
+    const auto stored = upload_case(channel_, archive_, {});
+    ASSERT_FALSE(stored);
+    EXPECT_NE(stored.error().message.find(meant), std::string::npos) << stored.error().message;
+  }
+}
+
 TEST_F(CaseClientTest, AFileThatIsNotThereIsNamed) {
   const auto stored = upload_case(channel_, temp_ / "no.zip", {});
   ASSERT_FALSE(stored);
@@ -170,6 +186,11 @@ TEST_F(CaseClientTest, ARoomIsAskedForByNameAndCase) {
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().code, ErrorCode::exists);
   EXPECT_EQ(refused.error().message, "there is a room ward");
+  rooms_.answer = {grpc::StatusCode::UNAVAILABLE, "Socket closed"};
+  const auto lost = create_room_with(channel_, "ward", hash, {});
+  ASSERT_FALSE(lost);
+  EXPECT_NE(lost.error().message.find("it may be open"), std::string::npos) << lost.error().message;
+  EXPECT_EQ(lost.error().message.find("Socket"), std::string::npos) << lost.error().message;
 }
 
 }  // namespace

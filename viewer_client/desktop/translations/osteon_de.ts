@@ -248,8 +248,12 @@
 <context>
     <name>CaseSending</name>
     <message>
-        <source>Cancelled. The server keeps nothing, and the case here stays.</source>
-        <translation>Abgebrochen. Der Server behält nichts, und der Fall hier bleibt.</translation>
+        <source>Cancelled. The server stored nothing, and the case here stays.</source>
+        <translation>Abgebrochen. Der Server hat nichts gespeichert, und der Fall hier bleibt.</translation>
+    </message>
+    <message>
+        <source>Cancelled. A server that had already checked the case may have it.</source>
+        <translation>Abgebrochen. Hatte der Server den Fall schon geprüft, hat er ihn vielleicht.</translation>
     </message>
     <message>
         <source>Cannot make the folder %1. Choose a place where you may write.</source>
@@ -268,8 +272,8 @@
         <translation>%1 hat den Fall, und der Raum %2 ist damit offen.</translation>
     </message>
     <message>
-        <source>Cancelled. %1 has the case already.</source>
-        <translation>Abgebrochen. %1 hat den Fall schon.</translation>
+        <source>Cancelled. %1 has the case, and the room may be open.</source>
+        <translation>Abgebrochen. %1 hat den Fall, und der Raum ist vielleicht offen.</translation>
     </message>
     <message>
         <source>%1 has the case, but did not open the room: %2</source>
@@ -755,7 +759,7 @@
         <translation>Landmarken</translation>
     </message>
     <message>
-        <source>A click shows one, and the next click with Landmark moves it. F2 renames it.</source>
+        <source>A click or Enter shows one, and the next click with Landmark moves it. F2 renames it.</source>
         <translation>Ein Klick zeigt eine, der nächste mit Landmarke verschiebt sie. F2 benennt um.</translation>
     </message>
     <message>
@@ -1094,12 +1098,16 @@
         <translation>Der Knochen ist erzeugt. Sein Bericht ist %1.</translation>
     </message>
     <message>
+        <source>The bone is made. No program opens its report %1.</source>
+        <translation>Der Knochen ist erzeugt. Kein Programm öffnet seinen Bericht %1.</translation>
+    </message>
+    <message>
         <source>Ed&amp;ges</source>
         <translation>Kan&amp;ten</translation>
     </message>
     <message>
-        <source>Lines where the HU change most, after Canny</source>
-        <translation>Linien, wo sich die HU am meisten ändern, nach Canny</translation>
+        <source>Lines where the HU change most, by Canny's method</source>
+        <translation>Linien, wo sich die HU am meisten ändern, mit Cannys Verfahren</translation>
     </message>
     <message>
         <source>Finding the edges</source>
@@ -1170,6 +1178,10 @@
 </context>
 <context>
     <name>ImagingSteps</name>
+    <message>
+        <source>The edges are not those of the scan. Find them again.</source>
+        <translation>Die Kanten gehören nicht zum Scan. Suchen Sie sie noch einmal.</translation>
+    </message>
     <message>
         <source>CT, %1 slices, %2 × %3 pixels</source>
         <translation>CT, %1 Schichten, %2 × %3 Pixel</translation>
@@ -1618,6 +1630,10 @@
         <translation>Ein anderer Knochen wird gerade gespeichert. Versuchen Sie es danach noch einmal.</translation>
     </message>
     <message>
+        <source>Another case is being sent. Try again when that is done.</source>
+        <translation>Ein anderer Fall wird gerade gesendet. Versuchen Sie es danach noch einmal.</translation>
+    </message>
+    <message>
         <source>Saving %1: %2 %</source>
         <translation>%1 wird gespeichert: %2 %</translation>
     </message>
@@ -1788,6 +1804,10 @@
     <message>
         <source>The window closes when the bone is saved. Close it once more to give that up.</source>
         <translation>Das Fenster schließt nach dem Speichern. Noch einmal schließen bricht es ab.</translation>
+    </message>
+    <message>
+        <source>The window closes when the case is sent. Close it once more to give that up.</source>
+        <translation>Das Fenster schließt nach dem Senden. Noch einmal schließen bricht es ab.</translation>
     </message>
     <message>
         <source>Game pad</source>

@@ -87,6 +87,7 @@ TEST(ImagingEdits, LandmarksAreRenamedAndRemoved) {
   EXPECT_FALSE(rename_landmark(edits, "c", "d"));
   EXPECT_FALSE(rename_landmark(edits, "a", ""));
   EXPECT_FALSE(rename_landmark(edits, "a", std::string(61, 'x')));
+  EXPECT_TRUE(rename_landmark(edits, "a", "a")) << "its own name";
   EXPECT_TRUE(rename_landmark(edits, "a", "c"));
   ASSERT_EQ(edits.landmarks.size(), 2u);
   EXPECT_EQ(edits.landmarks[0], (MarkedLandmark{"c", {1, 2, 3}}));
