@@ -12,6 +12,8 @@
 #include <QWheelEvent>
 #include <cmath>
 #include <cstdlib>
+#include <memory>
+#include <optional>
 
 #include "tests/integration/imaging_bench.hpp"
 #include "viewer_client/desktop/imaging_solid.hpp"
@@ -188,6 +190,65 @@ TEST_F(ImagingSolidTest, SoftTissueIsCoarseWhileTheViewMoves) {
   EXPECT_GE(view().width(), view().minimumSizeHint().width());
   EXPECT_GE(view().height(), view().minimumSizeHint().height());
   keep_picture("solid_small");
+}
+
+// The picture without a window round it: what the page does between two events cannot be timed there.
+class ImagingSolidTestAlone : public test::WindowBench {
+ protected:
+  // Two boxes of bone, of which the first one goes through all rows. The last row is at the patient's front, and is
+  // the only one of its block.
+  void SetUp() override {
+    ASSERT_TRUE(desk_->stands()) << "Xvfb, of Debian's package xvfb, did not start";
+    ScanGeometry geometry;
+    geometry.dims = {200, 21, 41};
+    geometry.axes_mm = Vec3(1, -1, 1).asDiagonal();
+    scene_.scan = {geometry, std::vector<std::int16_t>(geometry.count(), test::kMuscle_hu)};
+    VoxelFile<std::uint8_t> numbers{geometry, std::vector<std::uint8_t>(geometry.count())};
+    for (int k = 6; k <= 34; ++k)
+      for (int j = 0; j < 21; ++j)
+        for (int i = 60; i <= 140; ++i) numbers.values[numbers.index({i, j, k})] = 1;
+    for (int k = 6; k <= 34; ++k)
+      for (int i = 160; i <= 180; ++i) numbers.values[numbers.index({i, 10, k})] = 2;
+    scene_.islands = *IslandMap::make(geometry, std::move(numbers));
+    scene_.look.kept[1].set(1);
+    solid_ = std::make_unique<ImagingSolid>(scene_, [this](const std::array<int, 3>& voxel) { chosen_ = voxel; });
+    solid_->resize(400, 340);
+    solid_->show();
+    solid_->begin();
+    ASSERT_TRUE(until([&] { return solid_->current() && solid_->view().frames() > 0; }));
+  }
+
+  ImagingScene scene_;
+  std::optional<std::array<int, 3>> chosen_;
+  std::unique_ptr<ImagingSolid> solid_;
+};
+
+TEST_F(ImagingSolidTestAlone, ACutEndOfABoneChoosesItsLastVoxel) {
+  QTest::keyClick(&solid_->view(), Qt::Key_Return);
+  ASSERT_TRUE(chosen_);
+  EXPECT_EQ((*chosen_)[1], 20);
+}
+
+TEST_F(ImagingSolidTestAlone, AnEditBeforeAnotherThresholdIsNotLost) {
+  scene_.look.kept[2].set(1);
+  solid_->refresh();
+  scene_.look.threshold_hu = 500.0;
+  solid_->refresh();
+  QTest::qWait(400);  // longer than the pause after an edit
+  EXPECT_FALSE(solid_->current());
+  scene_.look.threshold_hu.reset();
+  solid_->refresh();
+  EXPECT_TRUE(until([&] { return solid_->current(); }));
+}
+
+TEST_F(ImagingSolidTestAlone, SoftTissueComesAfterAnotherFilter) {
+  scene_.look.threshold_hu = 500.0;
+  solid_->refresh();
+  solid_->findChild<QCheckBox*>("soft_tissue")->setChecked(true);
+  solid_->release();
+  EXPECT_FALSE(solid_->view().scene().has_soft_tissue());
+  solid_->refresh();
+  EXPECT_TRUE(until([&] { return solid_->view().scene().has_soft_tissue(); }));
 }
 
 }  // namespace

@@ -63,10 +63,8 @@ ImagingSolid::ImagingSolid(const ImagingScene& scene, std::function<void(const s
   hint_->setObjectName("solid_hint");
   hint_->setWordWrap(true);
   hint_->setAlignment(Qt::AlignCenter);
-  view_ = new SolidView({[this](const Vec3& point_mm) {
-                           if (const auto voxel = voxel_of(scene_.scan.geometry, point_mm)) look_at_(*voxel);
-                         },
-                         [this] { update(); }});
+  view_ = new SolidView(
+      {[this](const Vec3& point_mm) { look_at_(voxel_near(scene_.scan.geometry, point_mm)); }, [this] { update(); }});
   stack_ = new QStackedWidget;
   stack_->addWidget(hint_);
   stack_->addWidget(view_);
@@ -111,6 +109,7 @@ void ImagingSolid::begin() {
   view_->scene().show_soft_tissue({}, {});
   has_surface_ = false;
   problem_.clear();
+  cross_.reset();
   view_->set_bounds(corners_of(scene_.scan.geometry));
   view_->look_overview();
   refresh();
@@ -123,7 +122,12 @@ void ImagingSolid::refresh() {
   show_cross();
   show_state();
   // With a threshold of the look, the islands are those of another one. Their surface stays until they are found.
-  if (scene_.look.threshold_hu) return;
+  // What was wanted before is asked for again then.
+  if (scene_.look.threshold_hu) {
+    wanted_.reset();
+    if (soft_->isChecked() && !has_soft_) pause_.start();
+    return;
+  }
   KeptParts now = kept();
   if (now == wanted_) return;
   wanted_ = std::move(now);
@@ -137,7 +141,8 @@ void ImagingSolid::ask() {
   job->surface = !scene_.look.threshold_hu && job->kept != shown_;
   job->soft = soft_->isChecked() && !has_soft_;
   if (maker_) {
-    const bool covers = (!job->surface || (job_->surface && job_->kept == job->kept)) && (!job->soft || job_->soft);
+    // A surface that nobody wants any more is cancelled too.
+    const bool covers = (job_->surface ? job_->kept == job->kept : !job->surface) && (!job->soft || job_->soft);
     if (!covers) job_->cancelled = true;
     return;
   }
@@ -171,7 +176,7 @@ void ImagingSolid::take(Job& done) {
     const Mesh mesh = done.mesh ? std::move(*done.mesh) : Mesh();
     has_surface_ = !mesh.triangles.empty();
     view_->scene().show_surface(mesh);
-    if (has_surface_) view_->set_bounds(points_of(mesh));
+    view_->set_bounds(has_surface_ ? points_of(mesh) : corners_of(scene_.scan.geometry));
   }
   if (done.soft && soft_->isChecked()) {
     has_soft_ = true;
@@ -181,19 +186,30 @@ void ImagingSolid::take(Job& done) {
 }
 
 void ImagingSolid::show_cross() {
+  if (cross_ == scene_.crosshair) return;
+  cross_ = scene_.crosshair;
   view_->scene().show_cross(grid_of(scene_.scan.geometry), scene_.crosshair);
-  view_->redraw();
+  view_->redraw(true);
 }
 
 void ImagingSolid::show_state() {
   const bool older = scene_.look.threshold_hu.has_value() && has_surface_;
-  view_->scene().show_notice(older ? tr("The parts that were found last").toStdString() : std::string());
+  const bool making = maker_ != nullptr && job_->surface;
+  const QString notice = older    ? tr("The parts that were found last")
+                         : making ? tr("Being made …")
+                                  : QString(problem_).replace(". ", ".\n");
+  if (notice != notice_) {
+    notice_ = notice;
+    view_->scene().show_notice(notice.toStdString());
+    view_->redraw(true);
+  }
   // Until something is to be seen, no time goes into drawing.
   const bool something = has_surface_ || view_->scene().has_soft_tissue();
   if (!something)
     hint_->setText(!problem_.isEmpty() ? problem_
                    : maker_ != nullptr ? tr("Being made …")
                                        : tr("What you keep appears here in three dimensions."));
+  if (!something && view_->hasFocus()) soft_->setFocus();
   stack_->setCurrentWidget(something ? static_cast<QWidget*>(view_) : hint_);
 }
 

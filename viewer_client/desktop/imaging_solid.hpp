@@ -32,7 +32,7 @@ class ImagingSolid : public QWidget {
   ~ImagingSolid() override;
 
   // Call this before the scan or the islands of the scene change, because the other thread reads them. It stops that
-  // thread, which takes the time of a slice.
+  // thread, which takes the time of a slice, or that of a surface's smoothing.
   void release();
   // Another scan.
   void begin();
@@ -62,8 +62,10 @@ class ImagingSolid : public QWidget {
   const ImagingScene& scene_;
   std::function<void(const std::array<int, 3>& voxel)> look_at_;
   std::optional<KeptParts> wanted_, shown_;  // `shown_`: nothing if islands or scan have changed since
+  std::optional<std::array<int, 3>> cross_;  // the crosshair of the picture
   bool has_surface_ = false, has_soft_ = false;
   QString problem_;  // why there is no surface
+  QString notice_;   // in the picture
   QTimer pause_;     // since the last edit
   QCheckBox* soft_;
   QLabel* hint_;

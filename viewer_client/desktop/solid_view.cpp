@@ -15,6 +15,7 @@ namespace osteon {
 namespace {
 
 constexpr double kTurnRadPerPixel = 0.008, kTurnOfKey_rad = 0.15, kNearerOfNotch = 0.85, kWheelNotch = 120.0;
+constexpr double kAsideOfKey = 0.05;  // of the picture's height
 constexpr std::chrono::milliseconds kLeastFrame{16}, kAtRest{250};
 
 }  // namespace
@@ -54,7 +55,8 @@ void SolidView::look_overview() {
   redraw();
 }
 
-void SolidView::redraw() {
+void SolidView::redraw(bool moving) {
+  moving_ = moving_ || moving;
   if (frame_timer_.isActive()) return;
   const auto wait = std::chrono::ceil<std::chrono::milliseconds>(next_frame_ - std::chrono::steady_clock::now());
   frame_timer_.start(std::max(std::chrono::milliseconds(0), wait));
@@ -64,8 +66,10 @@ void SolidView::draw() {
   if (!isVisible() || !isValid() || drawing_) return;
   drawing_ = true;
   const auto begin = std::chrono::steady_clock::now();
-  const bool coarse = scene_->has_soft_tissue() && rest_timer_.isActive();
+  const bool coarse = scene_->has_soft_tissue() && (moving_ || rest_timer_.isActive());
+  moving_ = false;
   scene_->draw(coarse);
+  if (coarse) rest_timer_.start();  // from now on, because the picture may take longer than the pause
   ++frames_;
   coarse_frames_ += coarse ? 1 : 0;
   const auto end = std::chrono::steady_clock::now();
@@ -77,8 +81,7 @@ void SolidView::draw() {
 void SolidView::move(const CameraView& view) {
   whole_ = false;
   scene_->look(view);
-  if (scene_->has_soft_tissue()) rest_timer_.start();
-  redraw();
+  redraw(true);
 }
 
 void SolidView::look_whole(const CameraView& from) {
@@ -132,15 +135,20 @@ void SolidView::wheelEvent(QWheelEvent* event) {
 }
 
 void SolidView::keyPressEvent(QKeyEvent* event) {
+  const auto arrow = [&](int right, int up) {
+    move((event->modifiers() & Qt::ShiftModifier) != 0
+             ? shifted(camera(), kAsideOfKey * right, kAsideOfKey * up)
+             : orbited(camera(), kTurnOfKey_rad * right, kTurnOfKey_rad * up));
+  };
   switch (event->key()) {
     case Qt::Key_Left:
-      return move(orbited(camera(), -kTurnOfKey_rad, 0.0));
+      return arrow(-1, 0);
     case Qt::Key_Right:
-      return move(orbited(camera(), kTurnOfKey_rad, 0.0));
+      return arrow(1, 0);
     case Qt::Key_Up:
-      return move(orbited(camera(), 0.0, kTurnOfKey_rad));
+      return arrow(0, 1);
     case Qt::Key_Down:
-      return move(orbited(camera(), 0.0, -kTurnOfKey_rad));
+      return arrow(0, -1);
     case Qt::Key_Plus:
     case Qt::Key_PageUp:
       return move(zoomed(camera(), kNearerOfNotch));

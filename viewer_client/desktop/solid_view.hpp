@@ -1,6 +1,6 @@
 // The picture of a scan in three dimensions, and the mouse over it: a drag turns it, the wheel brings it nearer, a
-// double click chooses a point of the surface. Arrow keys, + and -, and Enter do the same; Enter takes the middle of
-// the picture. Home shows all.
+// double click chooses a point of the surface. Shift and a drag move it aside. Arrow keys, with Shift too, + and -, and
+// Enter do the same; Enter takes the middle of the picture. Home shows all.
 #pragma once
 #include <QCoreApplication>
 #include <QPoint>
@@ -38,8 +38,9 @@ class SolidView : public QVTKOpenGLNativeWidget {
   // From the patient's front, as at first.
   void look_overview();
   [[nodiscard]] CameraView camera() const { return scene_->camera(); }
-  // Marks the picture as old. It is drawn soon, at most at the display's rate.
-  void redraw();
+  // Marks the picture as old. It is drawn soon, at most at the display's rate. `moving`: more such calls are likely, so
+  // soft tissue is coarse until there is a pause.
+  void redraw(bool moving = false);
   // Pictures so far, and of them those with soft tissue in a low resolution.
   [[nodiscard]] std::uint64_t frames() const { return frames_; }
   [[nodiscard]] std::uint64_t coarse_frames() const { return coarse_frames_; }
@@ -72,7 +73,7 @@ class SolidView : public QVTKOpenGLNativeWidget {
   bool whole_ = true;  // nobody has moved the camera
   QTimer frame_timer_, rest_timer_;
   std::chrono::steady_clock::time_point next_frame_{};
-  bool drawing_ = false;
+  bool moving_ = false, drawing_ = false;
   std::uint64_t frames_ = 0, coarse_frames_ = 0;
 };
 

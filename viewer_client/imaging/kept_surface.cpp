@@ -1,6 +1,7 @@
 #include "viewer_client/imaging/kept_surface.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <span>
 #include <utility>
@@ -12,7 +13,7 @@ namespace osteon {
 
 namespace {
 
-constexpr std::size_t kMostTriangles = 4'000'000;
+constexpr std::size_t kMostTriangles = 1'000'000;
 constexpr std::int64_t kSolidPart = 4;  // a block is solid from this part of it on
 
 // The plane of each slice along the voxels, so that its pixels lie as the voxels do.
@@ -37,6 +38,8 @@ class KeptSlices {
     for (std::size_t island = 1; island < kept.bones.size(); ++island) grows_.set(island, kept.bones[island].any());
   }
 
+  // Whether there may be such a voxel.
+  [[nodiscard]] bool any() const { return grows_.any() || !kept_.corrections.empty(); }
   void add_to(BlockSums& sums, int slice) {
     if (slice < range_.first[2] || slice > range_.last[2]) return;
     const auto marks = corrected_plane(scan_, islands_, kept_.bones, axes_, slice, kept_.corrections);
@@ -86,6 +89,7 @@ Result<Mesh> kept_surface(const ScanGeometry& scan, const IslandMap& islands, co
   const ScanBlocks blocks = blocks_of(scan);
   BlockSums sums(scan, blocks);
   KeptSlices slices(scan, islands, kept);
+  if (!slices.any()) return Mesh();
   bool stopped = false;
   const auto read = [&](int block, std::span<std::uint8_t> solid) {
     sums.begin(block);
@@ -106,6 +110,16 @@ Result<Mesh> kept_surface(const ScanGeometry& scan, const IslandMap& islands, co
   mesh.positions_mm = std::move(surface->positions_mm);
   mesh.triangles = std::move(surface->triangles);
   return mesh;
+}
+
+std::array<int, 3> voxel_near(const ScanGeometry& scan, const Vec3& at_mm) {
+  const Vec3 at = scan.axes_mm.inverse() * (at_mm - scan.origin_mm);
+  std::array<int, 3> voxel{};
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto a = static_cast<std::size_t>(axis);
+    voxel[a] = static_cast<int>(std::lround(std::clamp(at[axis], 0.0, scan.dims[a] - 1.0)));
+  }
+  return voxel;
 }
 
 }  // namespace osteon

@@ -1,5 +1,6 @@
 // The surface of what is kept of a scan, as far as it is known before osteon-import makes the bone.
 #pragma once
+#include <array>
 #include <optional>
 #include <vector>
 
@@ -23,5 +24,9 @@ struct KeptParts {
 // scan. Errors: cancelled, exhausted (too many triangles).
 [[nodiscard]] Result<Mesh> kept_surface(const ScanGeometry& scan, const IslandMap& islands, const KeptParts& kept,
                                         const KeepGoing& keep_going);
+
+// The voxel of the scan that is nearest to a point of its surface. Where the bone reaches the scan's end, the surface
+// lies beyond it, by less than a block.
+[[nodiscard]] std::array<int, 3> voxel_near(const ScanGeometry& scan, const Vec3& at_mm);
 
 }  // namespace osteon

@@ -10,6 +10,8 @@
 #include <vtkVolume.h>
 #include <vtkVolumeProperty.h>
 
+#include <algorithm>
+#include <cmath>
 #include <cstring>
 
 namespace osteon {
@@ -28,8 +30,9 @@ constexpr TissueLook kTissueLooks[] = {
     {180.0, 0.030, 0.88, 0.62, 0.50}, {300.0, 0.25, 0.93, 0.86, 0.74},   {900.0, 0.60, 0.96, 0.92, 0.84},
     {2000.0, 0.80, 1.0, 0.98, 0.95},
 };
-constexpr double kFineSample = 0.6;  // of the smallest voxel edge, along a ray
-constexpr float kCoarseRays_px = 3.0f, kCoarseSamples = 3.0f;
+constexpr double kFineSample = 0.6;      // of the smallest voxel edge, along a ray
+constexpr double kMostRays = 200'000.0;  // [A] the mapper casts on the CPU
+constexpr float kCoarseRays = 3.0f, kCoarseSamples = 3.0f;
 
 }  // namespace
 
@@ -97,7 +100,10 @@ void SoftTissue::hide() {
 bool SoftTissue::shown() const { return impl_->shown; }
 
 void SoftTissue::set_coarse(bool coarse) {
-  impl_->mapper->SetImageSampleDistance(coarse ? kCoarseRays_px : 1.0f);
+  const int* size = impl_->renderer.GetSize();
+  const double pixels = static_cast<double>(size[0]) * size[1];
+  const auto fine_px = static_cast<float>(std::max(1.0, std::sqrt(pixels / kMostRays)));
+  impl_->mapper->SetImageSampleDistance(coarse ? kCoarseRays * fine_px : fine_px);
   impl_->mapper->SetSampleDistance(coarse ? kCoarseSamples * impl_->sample_mm : impl_->sample_mm);
 }
 

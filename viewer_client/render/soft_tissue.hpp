@@ -21,7 +21,8 @@ class SoftTissue {
   void show(const VoxelGrid& grid, std::span<const std::int16_t> hu);
   void hide();
   [[nodiscard]] bool shown() const;
-  // How fine the next picture is. Coarse: a ray for each 3 x 3 pixels, and a third of the samples along it.
+  // How fine the next picture is. Fine: a ray for each pixel, or 200 000 rays if the picture has more. Coarse: a ninth
+  // of these rays, and a third of the samples along each.
   void set_coarse(bool coarse);
 
  private:

@@ -46,7 +46,7 @@ class KeptSurface : public testing::Test {
   void correct(Correction correction) {
     kept_.corrections.push_back(std::make_shared<const Correction>(std::move(correction)));
   }
-  // All of it lies on the sphere, to within a block.
+  // All of it lies on the sphere, to within a block, and it is not shifted.
   void expect_ball(const Mesh& mesh, const Vec3& centre_mm, double radius_mm) const {
     ASSERT_FALSE(mesh.triangles.empty());
     const TriangleMesh plain{mesh.positions_mm, mesh.triangles, {}};
@@ -54,12 +54,15 @@ class KeptSurface : public testing::Test {
     const auto volume_mm3 = [](double radius) { return 4.0 / 3.0 * std::numbers::pi * radius * radius * radius; };
     EXPECT_GT(enclosed_mm3(plain), volume_mm3(radius_mm - 0.5 * block_mm_));
     EXPECT_LT(enclosed_mm3(plain), volume_mm3(radius_mm + 0.5 * block_mm_));
+    Vec3 sum = Vec3::Zero();
     for (std::uint32_t vertex = 0; vertex < mesh.positions_mm.size(); ++vertex) {
       const Vec3 from_centre = position(plain, vertex) - centre_mm;
+      sum += from_centre;
       ASSERT_NEAR(from_centre.norm(), radius_mm, block_mm_);
       const auto& [x, y, z] = mesh.normals[vertex];
       ASSERT_GT(from_centre.normalized().dot(Vec3(x, y, z)), 0.6) << "it points inwards";
     }
+    EXPECT_LT(sum.norm() / static_cast<double>(mesh.positions_mm.size()), 0.25 * block_mm_);
   }
 
   ScanGeometry scan_;
@@ -128,6 +131,38 @@ TEST_F(KeptSurface, ACancelledOneGivesNone) {
   ASSERT_FALSE(stopped);
   EXPECT_EQ(stopped.error().code, ErrorCode::cancelled);
   EXPECT_EQ(asked, 20) << "it goes on after it was stopped";
+}
+
+// A bone through all slices. The last block has one of its two slices, so the surface ends beyond the scan.
+TEST(KeptSurfaceOfACutBone, ChoosesVoxelsOfTheScan) {
+  ScanGeometry scan;
+  scan.dims = {200, 61, 61};
+  scan.origin_mm = {3.0, -4.0, 9.0};
+  scan.axes_mm = Eigen::AngleAxisd(0.7, Vec3(3, 1, 2).normalized()).toRotationMatrix();
+  VoxelFile<std::uint8_t> numbers{scan, std::vector<std::uint8_t>(scan.count())};
+  for (int k = 0; k < 61; ++k)
+    for (int j = 20; j <= 40; ++j)
+      for (int i = 90; i <= 110; ++i) numbers.values[numbers.index({i, j, k})] = 1;
+  KeptParts kept;
+  kept.bones[1].set(1);
+  ASSERT_EQ(blocks_of(scan).step, (std::array<int, 3>{2, 2, 2}));
+  const auto rod = kept_surface(scan, *IslandMap::make(scan, std::move(numbers)), kept, kGoOn);
+  ASSERT_TRUE(rod);
+  const TriangleMesh plain{rod->positions_mm, rod->triangles, {}};
+  int beyond = 0;
+  for (std::uint32_t vertex = 0; vertex < rod->positions_mm.size(); ++vertex) {
+    const Vec3 at_mm = position(plain, vertex);
+    const Vec3 at = scan.axes_mm.transpose() * (at_mm - scan.origin_mm);
+    const std::array<int, 3> voxel = voxel_near(scan, at_mm);
+    ASSERT_NEAR(voxel[0], at.x(), 0.51);
+    ASSERT_NEAR(voxel[1], at.y(), 0.51);
+    ASSERT_GE(voxel[2], 0);
+    ASSERT_LE(voxel[2], 60);
+    if (at.z() <= 60.6) continue;
+    ++beyond;
+    ASSERT_EQ(voxel[2], 60);
+  }
+  EXPECT_GT(beyond, 50) << "the surface ends with the scan";
 }
 
 // A wall of one voxel among blocks of four is a quarter of them.
