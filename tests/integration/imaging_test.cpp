@@ -9,6 +9,7 @@
 #include <QLabel>
 #include <QListWidget>
 #include <QPushButton>
+#include <QSettings>
 #include <QSlider>
 #include <QSpinBox>
 #include <QTest>
@@ -380,6 +381,7 @@ TEST_F(ImagingTest, EachStepCanBeCancelled) {
 }
 
 TEST_F(ImagingTest, AWindowThatIsClosedLeavesNoScanBehind) {
+  const QByteArray layout = window_->saveState();
   open_scan(series("ct", two_balls()), 2);
   const auto has_scratch = [] {
     for (const auto& entry : fs::directory_iterator(cases_folder()))
@@ -387,6 +389,8 @@ TEST_F(ImagingTest, AWindowThatIsClosedLeavesNoScanBehind) {
     return false;
   };
   EXPECT_TRUE(has_scratch());
+  EXPECT_TRUE(window_->close());
+  EXPECT_EQ(QSettings().value("window/state").toByteArray(), layout) << "the next window has the room's panels again";
   window_.reset();
   EXPECT_FALSE(has_scratch());
 }

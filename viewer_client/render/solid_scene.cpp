@@ -102,7 +102,10 @@ std::optional<Vec3> SolidScene::surface_at(int x_px, int y_px) const {
   return impl_->bone.surface_at(x_px, impl_->window.GetActualSize()[1] - 1 - y_px);
 }
 
-void SolidScene::look(const CameraView& view) { set_view(*impl_->renderer->GetActiveCamera(), view); }
+void SolidScene::look(const CameraView& view) {
+  set_view(*impl_->renderer->GetActiveCamera(), view);
+  impl_->renderer->ResetCameraClippingRange();  // a point may be picked before the next picture
+}
 
 CameraView SolidScene::camera() const { return view_of(*impl_->renderer->GetActiveCamera()); }
 
