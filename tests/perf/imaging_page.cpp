@@ -69,7 +69,7 @@ class Memory {
 // Each step returns false, after a message, if the page did not do what it should.
 class Reader {
  public:
-  Reader() : page_({[](bool) {}, [](const std::filesystem::path&) {}, [] {}}) {
+  Reader() : page_({[](bool) {}, [](const std::filesystem::path&, const QString&) {}, [] {}}) {
     page_.resize(1280, 900);
     page_.show();
     (void)QTest::qWaitForWindowExposed(&page_, 30000);
