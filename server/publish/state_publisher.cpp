@@ -62,10 +62,12 @@ void StatePublisher::set_session_sender(SendToSessions sender) {
   send_to_sessions_ = std::move(sender);
 }
 
+// A client whose fast path has just begun sends one state by both ways, and a datagram may arrive late.
 void StatePublisher::update(CuttingState state) {
   const MutexLock lock(states_mutex_);
-  Shown& shown = states_[state.author];
-  shown = {std::move(state)};
+  const auto shown = states_.find(state.author);
+  if (shown != states_.end() && !shown->second.over && state.state_seq <= shown->second.state.state_seq) return;
+  states_[state.author] = {std::move(state)};
   changed_ = true;
 }
 

@@ -59,7 +59,7 @@ class StatePublisher {
   using SendToSessions = std::function<bool(const std::vector<CuttingState>&)>;
   void set_session_sender(SendToSessions sender);
 
-  void update(CuttingState state);  // the newest of its author wins
+  void update(CuttingState state);  // the newest of its author wins, in the order of state_seq
   void session_over(AuthorId author);
   void show(const std::vector<SceneItem>& items, const std::vector<BodyId>& bodies);
   // [tick] Enqueues what has changed since the newest message, and what is still owed to slower readers.

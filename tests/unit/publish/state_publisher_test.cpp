@@ -75,6 +75,27 @@ TEST(StatePublisher, TheToolOfAnEndedSessionRests) {
   EXPECT_TRUE(publisher.tool_tips_mm().empty());
 }
 
+// One client sends by its stream and by datagrams. The copy that arrives later is old, or known.
+TEST(StatePublisher, AStateThatIsNotNewerIsIgnored) {
+  CuttingState state;
+  state.author = AuthorId{7};
+  state.tool_name = "drill-3.2";
+  StatePublisher publisher;
+  const auto send = [&](std::uint64_t state_seq, double spindle_rpm) {
+    state.state_seq = state_seq;
+    state.spindle_rpm = spindle_rpm;
+    publisher.update(state);
+    publisher.publish(RoomSeq{1});
+    return shown_by(publisher).spindle_rpm;
+  };
+  EXPECT_EQ(send(50, 1000), 1000.0);
+  EXPECT_EQ(send(49, 900), 1000.0) << "older";
+  EXPECT_EQ(send(50, 900), 1000.0) << "known";
+  EXPECT_EQ(send(51, 1100), 1100.0);
+  publisher.session_over(state.author);
+  EXPECT_EQ(send(1, 1200), 1200.0) << "a new session counts from the start";
+}
+
 constexpr std::chrono::seconds kPatience{20};
 
 CuttingState state_of(AuthorId author, std::uint64_t state_seq) {
