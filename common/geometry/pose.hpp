@@ -22,6 +22,10 @@ struct Pose {
   }
 };
 
+// The shortest rotation from one direction to another, both non-zero vectors. Files call this instead of Eigen's
+// template, because each file that uses the template compiles a singular value decomposition, which takes ten seconds.
+[[nodiscard]] Eigen::Quaterniond rotation_between(const Vec3& from, const Vec3& to);
+
 // The tool's pose with its tip at `tip_mm` and its +z axis (out of the tip) along `axis`, a non-zero vector.
 [[nodiscard]] Pose pose_along(const Vec3& tip_mm, const Vec3& axis);
 

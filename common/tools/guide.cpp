@@ -226,8 +226,7 @@ Pose pose_of(const Opening& opening, const Line& line, const Pose& wanted) {
   pose.position_mm = {tip.x(), tip.y(), line.tip_mm};
   const Vec3 axis = Vec3(line.slope.x(), line.slope.y(), 1.0).normalized();
   if (!opening.slot) {
-    pose.rotation =
-        (Eigen::Quaterniond::FromTwoVectors(wanted.direction(Vec3::UnitZ()), axis) * wanted.rotation).normalized();
+    pose.rotation = (rotation_between(wanted.direction(Vec3::UnitZ()), axis) * wanted.rotation).normalized();
     return pose;
   }
   Vec3 normal = Vec3(-line.roll, 1.0, line.roll * line.slope.x() - line.slope.y()).normalized();

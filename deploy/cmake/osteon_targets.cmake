@@ -73,25 +73,39 @@ function(osteon_program name)
 endfunction()
 
 # Headers that most tests include, compiled once for all of them. Tests still include all that they use, because the
-# preset `lint` compiles without this, and so does clang.
+# preset `lint` compiles without this, and so does clang. QT: a test of the window. Qt wants other code (`-fPIC`), for
+# which GCC refuses the other tests' compiled headers, and these tests include Qt's headers too.
 function(osteon_precompile_test target)
+  cmake_parse_arguments(arg "QT" "" "" ${ARGN})
   if(NOT CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
     return()
   endif()
-  if(NOT TARGET osteon_test_headers)
-    # A target needs a file. This one is empty.
-    file(CONFIGURE OUTPUT ${PROJECT_BINARY_DIR}/test_headers.cpp CONTENT "")
-    add_library(osteon_test_headers OBJECT ${PROJECT_BINARY_DIR}/test_headers.cpp)
-    target_link_libraries(osteon_test_headers PRIVATE
-      osteon_flags osteon_test_flags Eigen3::Eigen tl::expected GTest::gmock)
-    target_precompile_headers(osteon_test_headers PRIVATE
-      <algorithm> <array> <chrono> <filesystem> <functional> <map> <memory> <mutex> <optional> <random> <sstream>
-      <string> <thread> <variant> <vector> <Eigen/Core> <Eigen/Geometry> <gmock/gmock.h> <gtest/gtest.h>
-      <tl/expected.hpp>)
+  set(name osteon_test_headers)
+  set(headers <algorithm> <array> <chrono> <filesystem> <functional> <map> <memory> <mutex> <optional> <random>
+    <sstream> <string> <thread> <variant> <vector> <Eigen/Core> <Eigen/Geometry> <gmock/gmock.h> <gtest/gtest.h>
+    <tl/expected.hpp>)
+  set(libraries)
+  if(arg_QT)
+    set(name osteon_window_test_headers)
+    list(APPEND headers <QApplication> <QComboBox> <QDockWidget> <QListWidget> <QMainWindow> <QMenu> <QPushButton>
+      <QSettings> <QSlider> <QSpinBox> <QStatusBar> <QTest> <QToolButton>)
+    set(libraries Qt5::Test Qt5::Widgets)
+    # A guide has slots, and so does Qt.
+    target_compile_definitions(${target} PRIVATE QT_NO_KEYWORDS)
   endif()
-  target_precompile_headers(${target} REUSE_FROM osteon_test_headers)
-  # ccache needs the option, to see that a file includes the headers.
-  target_compile_options(${target} PRIVATE -fpch-preprocess)
+  if(NOT TARGET ${name})
+    # A target needs a file. This one is empty.
+    file(CONFIGURE OUTPUT ${PROJECT_BINARY_DIR}/${name}.cpp CONTENT "")
+    add_library(${name} OBJECT ${PROJECT_BINARY_DIR}/${name}.cpp)
+    target_link_libraries(${name} PRIVATE
+      osteon_flags osteon_test_flags Eigen3::Eigen tl::expected GTest::gmock ${libraries})
+    target_precompile_headers(${name} PRIVATE ${headers})
+    target_compile_definitions(${name} PRIVATE $<$<BOOL:${arg_QT}>:QT_NO_KEYWORDS>)
+  endif()
+  target_precompile_headers(${target} REUSE_FROM ${name})
+  # ccache needs the option, to see that a file includes the headers. Compiled headers that GCC refuses end the build,
+  # which else only becomes slower.
+  target_compile_options(${target} PRIVATE -fpch-preprocess -Werror=invalid-pch)
 endfunction()
 
 # What a program of tests says if its filter matches no case. It ends with 0 then, but the entry of ctest fails.
@@ -114,9 +128,9 @@ endfunction()
 
 # A GoogleTest program. Each of its suites is registered with ctest: a process for each case would take longer to load
 # libraries than to test. LABELS name the kind of test. deploy/nightly builds NIGHTLY tests with the target
-# nightly_tests and runs them with `ctest -C nightly`. deploy/test neither builds nor runs them.
+# nightly_tests and runs them with `ctest -C nightly`. deploy/test neither builds nor runs them. QT: as above.
 function(osteon_test name)
-  cmake_parse_arguments(arg "NIGHTLY" "TIMEOUT" "SOURCES;DEPS;LABELS" ${ARGN})
+  cmake_parse_arguments(arg "NIGHTLY;QT" "TIMEOUT" "SOURCES;DEPS;LABELS" ${ARGN})
   add_executable(${name} ${arg_SOURCES})
   set(only)
   if(arg_NIGHTLY)
@@ -125,7 +139,11 @@ function(osteon_test name)
     set(only CONFIGURATIONS nightly)
   endif()
   target_link_libraries(${name} PRIVATE osteon_flags osteon_test_flags ${arg_DEPS} GTest::gmock_main)
-  osteon_precompile_test(${name})
+  set(qt)
+  if(arg_QT)
+    set(qt QT)
+  endif()
+  osteon_precompile_test(${name} ${qt})
   if(NOT arg_TIMEOUT)
     # Ends a test that hangs. A busy machine makes tests ten times as slow.
     set(arg_TIMEOUT 300)

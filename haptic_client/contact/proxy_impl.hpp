@@ -58,7 +58,7 @@ inline Pose with_play(const Pose& hole, const Pose& tool, double arm_mm, double 
   };
   const Vec3 behind(0, 0, -arm_mm), tip = followed(hole.position_mm, tool.position_mm);
   const Vec3 along = tip - followed(hole.point(behind), tool.point(behind));
-  return {tip, (Eigen::Quaterniond::FromTwoVectors(axis, along) * tool.rotation).normalized()};
+  return {tip, (rotation_between(axis, along) * tool.rotation).normalized()};
 }
 
 // A group's points, moved out of the tool along their normals. Tool frame.

@@ -130,7 +130,7 @@ TEST_F(ImagingEditsTest, ACutAndNamedBoneIsThatOfTheSameList) {
 TEST_F(ImagingEditsTest, FilterBoxAndBrushMakeTheBoneOfTheSameList) {
   auto& filter = part<QComboBox>("filter");
   filter.setCurrentIndex(3);
-  emit filter.activated(3);
+  Q_EMIT filter.activated(3);
   ASSERT_TRUE(until([&] { return found(2); })) << words();
   ImagingPlane& axial = plane("plane_axial");
   click("tool_box");
@@ -270,7 +270,7 @@ TEST_F(ImagingEditsTest, EdgesAreDrawnAndGoWithTheScan) {
   ASSERT_TRUE(until([&] { return found(2); })) << words();
   auto& filter = part<QComboBox>("filter");
   filter.setCurrentIndex(1);
-  emit filter.activated(1);
+  Q_EMIT filter.activated(1);
   ASSERT_TRUE(until([&] { return found(2) && !edges.isChecked(); })) << words();
   EXPECT_FALSE(on_surface()) << "they were of the scan before";
 }
@@ -283,7 +283,7 @@ TEST_F(ImagingEditsTest, AFilterShowsInThePlanesAndIsUndone) {
   EXPECT_TRUE(label("readout").startsWith("40 HU")) << label("readout").toStdString();
   auto& filter = part<QComboBox>("filter");
   filter.setCurrentIndex(3);
-  emit filter.activated(3);
+  Q_EMIT filter.activated(3);
   part<QDoubleSpinBox>("gaussian").setValue(2.0);
   ASSERT_TRUE(until([&] { return found(2) && !label("readout").startsWith("40 HU"); })) << words();
   click("undo_edit");
@@ -316,7 +316,7 @@ TEST_F(ImagingEditsTest, UndoShowsThePlainScanAfterASearchThatFailed) {
   fs::create_directories(islands / "taken");
   auto& filter = part<QComboBox>("filter");
   filter.setCurrentIndex(3);
-  emit filter.activated(3);
+  Q_EMIT filter.activated(3);
   ASSERT_TRUE(until([&] { return part<QPushButton>("find_parts").isVisible(); })) << words();
   EXPECT_FALSE(label("readout").startsWith("40 HU")) << label("readout").toStdString();
   // The left button still moves the crosshair, and the page says why it does not paint.

@@ -202,7 +202,7 @@ TEST_F(ImagingTest, TheRightButtonDragsTheWindowAndPresetsBringItBack) {
   // Each of 40 pixels raises the level by a two hundredth of the width: 400 HU.
   EXPECT_NEAR(grey(), 255.0 * ((40.0 - 900.0) / 2000.0 + 0.5), 1.5);
   preset.setCurrentIndex(1);
-  emit preset.activated(1);
+  Q_EMIT preset.activated(1);
   // Of soft tissue, 40 +- 200, it is the centre.
   EXPECT_NEAR(grey(), 127.5, 1.5);
 }

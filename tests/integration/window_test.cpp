@@ -242,7 +242,7 @@ TEST_F(WindowTest, AnotherSizeOfTheToolComesIntoTheHand) {
   const int other = size->findData("drill-5-16in");
   ASSERT_GE(other, 0);
   size->setCurrentIndex(other);
-  emit size->activated(other);
+  Q_EMIT size->activated(other);
   hover(middle() + QPoint(5, 5));
   EXPECT_TRUE(until([&] {
     const auto states = view_->updater()->states();

@@ -416,7 +416,7 @@ void PeopleOverlay::Impl::place(Drawn& one) {
     const Vec3 aside = upwards.norm() > 0.1 ? upwards.normalized() : normal.unitOrthogonal();
     const Vec3 outwards = (normal + 1.2 * aside).normalized();
     // VTK's inverted arrow runs from its tip at the origin along +x.
-    const Eigen::Matrix3d turn = Eigen::Quaterniond::FromTwoVectors(Vec3::UnitX(), outwards).toRotationMatrix();
+    const Eigen::Matrix3d turn = rotation_between(Vec3::UnitX(), outwards).toRotationMatrix();
     for (int row = 0; row < 3; ++row) {
       for (int column = 0; column < 3; ++column) matrix->SetElement(row, column, kArrow * px_mm * turn(row, column));
       matrix->SetElement(row, 3, at[row]);

@@ -49,7 +49,7 @@ std::vector<Cut> grazing_cuts(std::size_t count, Random& random) {
     const double depth = i % 200 == 7 ? random.between(1.0, 2.5) : random.between(-0.3, 0.35);
     // The tool's inward normal is along the bone's outward normal; any rotation about it.
     const Eigen::Quaterniond facing =
-        Eigen::AngleAxisd(random.between(0.0, 6.283), out) * Eigen::Quaterniond::FromTwoVectors(point.inward, out);
+        Eigen::AngleAxisd(random.between(0.0, 6.283), out) * rotation_between(point.inward, out);
     const auto pose = [&](const Eigen::Quaterniond& rotation, const Vec3& contact) {
       return Pose{contact - rotation * point.position_mm, rotation};
     };

@@ -1,5 +1,8 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
+
 #include "common/geometry/lattice.hpp"
 #include "common/geometry/pose.hpp"
 
@@ -18,6 +21,16 @@ TEST(Pose, AlongPutsTheTipAndPointsTheAxis) {
     const Pose pose = pose_along({7, 8, 9}, axis);
     EXPECT_LT((pose.point(Vec3::Zero()) - Vec3(7, 8, 9)).norm(), 1e-12);
     EXPECT_LT((pose.direction(Vec3::UnitZ()) - axis.normalized()).norm(), 1e-12);
+  }
+}
+
+TEST(Pose, ARotationBetweenTwoDirectionsIsTheShortest) {
+  const Vec3 from{3, -4, 12};
+  for (const Vec3& to : {Vec3{1, 0, 0}, Vec3{-3, 4, -12}, Vec3{6, -8, 24}}) {
+    const Eigen::Quaterniond turn = rotation_between(from, to);
+    EXPECT_LT((turn * from.normalized() - to.normalized()).norm(), 1e-12);
+    const double angle = std::acos(std::clamp(from.normalized().dot(to.normalized()), -1.0, 1.0));
+    EXPECT_NEAR(Eigen::AngleAxisd(turn).angle(), angle, 1e-7);
   }
 }
 

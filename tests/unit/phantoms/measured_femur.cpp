@@ -84,11 +84,11 @@ ShaftLine measure_shaft(const BoneView& bone, const std::vector<Vec3>& points, d
       sagittal.row(i) << along * along, along, 1.0;
       y[i] = middle.y();
     }
-    const Eigen::VectorXd c = coronal.colPivHouseholderQr().solve(x);
+    const Eigen::VectorXd c = least_squares(coronal, x);
     line.up = Vec3(c[0], 0.0, 1.0).normalized();
     line.lateral = {line.up.z(), 0.0, -line.up.x()};
     line.lateral_mm = c[1] * line.lateral.x();
-    const Eigen::VectorXd s = sagittal.colPivHouseholderQr().solve(y);
+    const Eigen::VectorXd s = least_squares(sagittal, y);
     line.radius_mm = -0.5 / s[0];
     line.apex_mm = -0.5 * s[1] / s[0];
     line.forward_mm = s[2] - 0.25 * s[1] * s[1] / s[0];
@@ -250,7 +250,7 @@ double cortex_at(const BoneView& bone, const ShaftLine& shaft, double along, dou
     for (double turn = -12.0; turn <= 12.0; turn += 2.0)
       thickness[i] += bone.cortex_mm(centre, Eigen::AngleAxisd(turn / kDegrees, shaft.up) * side, thickest_mm) / 13.0;
   }
-  return rows.colPivHouseholderQr().solve(thickness)[0];
+  return least_squares(rows, thickness)[0];
 }
 
 // Width, depth and cortex at the stations of the shaft.
@@ -403,6 +403,10 @@ int bone_beside(const Case& bone, const Vec3& at_mm) {
   return bone.bone_number(deepest);
 }
 
+Eigen::VectorXd least_squares(const Eigen::MatrixXd& rows, const Eigen::VectorXd& values) {
+  return rows.colPivHouseholderQr().solve(values);
+}
+
 Ball fitted_ball(const std::vector<Vec3>& points) {
   // |p|² = 2 c·p + (r² - c²) is linear in c and in the last term.
   Eigen::MatrixXd rows(static_cast<Eigen::Index>(points.size()), 4);
@@ -411,7 +415,7 @@ Ball fitted_ball(const std::vector<Vec3>& points) {
     rows.row(static_cast<Eigen::Index>(i)) << 2.0 * points[i].transpose(), 1.0;
     squares[static_cast<Eigen::Index>(i)] = points[i].squaredNorm();
   }
-  const Eigen::VectorXd found = rows.colPivHouseholderQr().solve(squares);
+  const Eigen::VectorXd found = least_squares(rows, squares);
   const Vec3 centre = found.head<3>();
   return {centre, std::sqrt(found[3] + centre.squaredNorm())};
 }
@@ -424,7 +428,7 @@ Ball fitted_circle(const std::vector<Vec3>& points) {
     rows.row(static_cast<Eigen::Index>(i)) << 2.0 * p.y(), 2.0 * p.z(), 1.0;
     squares[static_cast<Eigen::Index>(i)] = p.y() * p.y() + p.z() * p.z();
   }
-  const Eigen::VectorXd found = rows.colPivHouseholderQr().solve(squares);
+  const Eigen::VectorXd found = least_squares(rows, squares);
   return {{0.0, found[0], found[1]}, std::sqrt(found[2] + found.head<2>().squaredNorm())};
 }
 

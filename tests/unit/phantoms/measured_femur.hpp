@@ -35,6 +35,10 @@ class BoneView {
 // may have any number.
 [[nodiscard]] int bone_beside(const Case& bone, const Vec3& at_mm);
 
+// The x for which |rows x - values| is least. Compiled once, because each type of matrix that a file solves for takes
+// seconds.
+[[nodiscard]] Eigen::VectorXd least_squares(const Eigen::MatrixXd& rows, const Eigen::VectorXd& values);
+
 struct Ball {
   Vec3 centre = Vec3::Zero();
   double radius = 0.0;

@@ -63,7 +63,7 @@ void measure_plateau(const BoneView& view, const std::vector<Vec3>& tibia, Value
     rows.row(static_cast<Eigen::Index>(i)) << 1.0, face[i].x(), face[i].y();
     heights[static_cast<Eigen::Index>(i)] = face[i].z();
   }
-  const Eigen::VectorXd plane = rows.colPivHouseholderQr().solve(heights);
+  const Eigen::VectorXd plane = least_squares(rows, heights);
   const double slope = std::atan(plane[2]);
   found["slope_degrees"] = slope * 180.0 / std::numbers::pi;
   found["length_mm"] = plane[0] - extent_of(tibia, 2).least;

@@ -88,7 +88,7 @@ Line fitted_line(const std::vector<Vec3>& points) {  // y over x
     rows.row(static_cast<Eigen::Index>(i)) << 1.0, points[i].x();
     y[static_cast<Eigen::Index>(i)] = points[i].y();
   }
-  const Eigen::VectorXd found = rows.colPivHouseholderQr().solve(y);
+  const Eigen::VectorXd found = least_squares(rows, y);
   return {found[0], found[1]};
 }
 

@@ -240,24 +240,8 @@ class MeasuredPelvis {
     std::vector<Vec3> cap;
     for (const Vec3& p : points_)
       if (part(p) && p.dot(way) > farthest - 1.0) cap.push_back(p);
-    const auto [centre, radius] = ball(cap);
+    const auto [centre, radius] = fitted_ball(cap);
     return centre + radius * way;
-  }
-
-  struct Ball {
-    Vec3 centre;
-    double radius = 0.0;
-  };
-  // Least squares of |p|² = 2 c·p + (r² - |c|²).
-  [[nodiscard]] static Ball ball(const std::vector<Vec3>& points) {
-    Eigen::MatrixXd rows(points.size(), 4);
-    Eigen::VectorXd squares(points.size());
-    for (std::size_t i = 0; i < points.size(); ++i) {
-      rows.row(static_cast<Eigen::Index>(i)) << 2.0 * points[i].transpose(), 1.0;
-      squares[static_cast<Eigen::Index>(i)] = points[i].squaredNorm();
-    }
-    const Eigen::VectorXd c = rows.colPivHouseholderQr().solve(squares);
-    return {c.head<3>(), std::sqrt(c[3] + c.head<3>().squaredNorm())};
   }
 
   // The lunate surface: what lies on one ball, beginning with a guess of a surgeon's finger.
@@ -271,7 +255,7 @@ class MeasuredPelvis {
             from.z() > -0.3 * from.norm())
           near.push_back(p);
       }
-      found = ball(near);
+      found = fitted_ball(near);
     }
     return found;
   }
@@ -307,7 +291,8 @@ class MeasuredPelvis {
       for (const Vec3& p : rim) mean += p / static_cast<double>(rim.size());
       Eigen::MatrixXd off(rim.size(), 3);
       for (std::size_t i = 0; i < rim.size(); ++i) off.row(static_cast<Eigen::Index>(i)) = (rim[i] - mean).transpose();
-      const Vec3 found = off.jacobiSvd(Eigen::ComputeThinV).matrixV().col(2);
+      const Eigen::Matrix3d spread = off.transpose() * off;
+      const Vec3 found = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(spread).eigenvectors().col(0);
       normal = found.dot(normal) < 0.0 ? Vec3(-found) : found;
       plane_mm = (mean - socket.centre).dot(normal);
     }
@@ -397,7 +382,8 @@ class MeasuredPelvis {
       moments = (moments / area - first * first.transpose()).eval();
       if (round == 0) middle += first.x() * across + first.y() * up;
     }
-    const Eigen::Vector2d squares = Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(moments).eigenvalues();
+    const Eigen::Vector2d squares =
+        Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>().computeDirect(moments).eigenvalues();
     return {4.0 * std::sqrt(squares[0]), 4.0 * std::sqrt(squares[1]), area, middle};
   }
   [[nodiscard]] Opening foramen() const {

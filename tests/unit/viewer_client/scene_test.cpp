@@ -236,9 +236,8 @@ TEST(CameraView, TheBoneFollowsTheCap) {
 
   // A twist of the cap turns the picture about its middle, right-handed about the cap's own axis.
   const CameraView turned = held_by_cap(before, Vec3::Zero(), twist, 0.25);
-  const double angle =
-      Eigen::Quaterniond::FromTwoVectors(seen(before, point).cross(twist), seen(turned, point).cross(twist))
-          .angularDistance(Eigen::Quaterniond::Identity());
+  const double angle = rotation_between(seen(before, point).cross(twist), seen(turned, point).cross(twist))
+                           .angularDistance(Eigen::Quaterniond::Identity());
   EXPECT_GT(angle, 0.1);
   EXPECT_LT((seen(turned, point) - Eigen::AngleAxisd(angle, twist) * seen(before, point)).norm(), 1e-9);
   EXPECT_EQ(turned.target_mm, before.target_mm);

@@ -143,7 +143,7 @@ TEST(SwungShank, StopsAtAWall) {
     // It lies along x over the wall, its tip 6 mm away. Then it turns about the tip so that the shank dips towards the
     // wall.
     const Vec3 tip(7.0, 0, -3.5);
-    const Pose level{tip, Eigen::Quaterniond::FromTwoVectors(Vec3::UnitZ(), Vec3::UnitX())};
+    const Pose level{tip, rotation_between(Vec3::UnitZ(), Vec3::UnitX())};
     stage.place(level);
     ASSERT_GT(stage.deepest_mm(), 0.2);
     const Pose dipped{tip, Eigen::Quaterniond(Eigen::AngleAxisd(60.0 * kDegree, Vec3::UnitY())) * level.rotation};

@@ -97,7 +97,7 @@ Case block(double pitch_mm, double width_mm, double deep_mm, const std::function
 
 // How each tool is held against a face that looks along -z. It is pushed along z, into the bone.
 Pose held(const Tool& tool) {
-  const Eigen::Quaterniond lying = Eigen::Quaterniond::FromTwoVectors(Vec3::UnitZ(), Vec3::UnitX());
+  const Eigen::Quaterniond lying = rotation_between(Vec3::UnitZ(), Vec3::UnitX());
   switch (tool.kind) {
     case ToolKind::round_burr:
     case ToolKind::barrel_burr:

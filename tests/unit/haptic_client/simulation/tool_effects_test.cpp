@@ -397,7 +397,7 @@ TEST(ToolEffects, ACloggedDrillCutsAgainAfterItWasRinsed) {
 // back.
 TEST(ToolEffects, ABurThatIsPressedTooHardStalls) {
   const Tool bur = *find_tool("burr-barrel");
-  const Pose lying{{4, 0, -3.5}, Eigen::Quaterniond::FromTwoVectors(Vec3::UnitZ(), Vec3::UnitX())};
+  const Pose lying{{4, 0, -3.5}, rotation_between(Vec3::UnitZ(), Vec3::UnitX())};
   Rig rig(slab(20.0, 1.9, 0.5, 7.0), bur, {}, nullptr, 1.0, lying);
   const double most_nmm = 80.0, arm_mm = 3.0, droop = 0.7 * 20.0 * 20.0 / 4.0;
   double least_rpm = 1e9, torque_nmm = 0.0, pressed_n = 0.0;
