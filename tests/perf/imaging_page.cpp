@@ -1,8 +1,9 @@
 // What the page of image processing costs with a folder of DICOM slices, on a screen of its own, with osteon-import as
-// its child. `slice FOLDER`: from the folder to the first slice that is drawn, with a person who chooses its only
-// series at once. `segment FOLDER`: memory while a person keeps parts, paints, erases, cuts, changes the threshold and
-// the filter, and undoes and does all of it again. `decode FOLDER`: GDCM alone, which reads the headers and decodes
-// every slice once. Prints JSON.
+// its child. `slice FOLDER`: from the folder to the first slice that is drawn, the middle one, with a person who
+// chooses its only series at once, and to all three planes. The first slice is compared with what GDCM reads. `segment
+// FOLDER`: memory while a person keeps parts, paints, erases, cuts, changes the threshold and the filter, and undoes
+// and does all of it again. `decode FOLDER`: GDCM alone, which reads the headers and decodes every slice once. Prints
+// JSON.
 #include <QCheckBox>
 #include <QComboBox>
 #include <QDoubleSpinBox>
@@ -15,10 +16,12 @@
 #include <QToolButton>
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <cstdio>
 #include <exception>
 #include <filesystem>
 #include <fstream>
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <set>
 #include <string>
@@ -37,7 +40,9 @@ using Clock = std::chrono::steady_clock;
 
 constexpr double kKbPerMb = 1024.0;
 constexpr int kStrokes = 60;
-constexpr std::size_t kGreysOfBone = 50;  // a slice that is drawn has more, an empty one a few
+constexpr std::size_t kGreysOfBone = 50;  // a plane that is drawn has more, an empty one a few
+constexpr double kMostDifference = 4.0;   // greys, mean; another slice or window has more
+constexpr int kCompared = 3;              // each third voxel along both axes
 
 // A line of a process's status, MB; 0 without it. `process`: a number, or "self".
 double status_mb(const std::string& process, std::string_view line_name) {
@@ -65,6 +70,38 @@ class Memory {
  private:
   double together_mb_ = 0.0;
 };
+
+std::size_t greys_of(const QImage& drawn) {
+  std::set<int> greys;
+  for (int y = 0; y < drawn.height(); ++y)
+    for (int x = 0; x < drawn.width(); ++x) greys.insert(qGray(drawn.pixel(x, y)));
+  return greys.size();
+}
+
+// The mean difference in greys of a picture of the plane from a slice in the window of bone, by DICOM's formula for a
+// window of 2000 HU about 500 HU. The picture is smaller than the slice, so that pixels are compared with the mean of
+// 3 x 3 voxels.
+double difference_of(const QImage& drawn, const ImagingPlane& plane, const baselines::GdcmSlice& slice) {
+  const auto grey = [&](int column, int row) {
+    double sum = 0.0;
+    for (int down = -1; down <= 1; ++down)
+      for (int right = -1; right <= 1; ++right) {
+        const double hu = slice.hu[static_cast<std::size_t>((row + down) * slice.columns + column + right)];
+        sum += 255.0 * std::clamp((hu - 500.0) / 2000.0 + 0.5, 0.0, 1.0);
+      }
+    return sum / 9.0;
+  };
+  double sum = 0.0;
+  int count = 0;
+  for (int row = 1; row < slice.rows - 1; row += kCompared)
+    for (int column = 1; column < slice.columns - 1; column += kCompared) {
+      const QPoint at = plane.pixel({column, row, slice.number});
+      if (!drawn.valid(at)) return 255.0;
+      sum += std::abs(qGray(drawn.pixel(at)) - grey(column, row));
+      ++count;
+    }
+  return count > 0 ? sum / count : 255.0;
+}
 
 // Each step returns false, after a message, if the page did not do what it should.
 class Reader {
@@ -114,6 +151,7 @@ class Reader {
 };
 
 bool Reader::opens(const std::string& folder, nlohmann::json& seen) {
+  const baselines::GdcmSlice middle = baselines::gdcm_middle_slice(folder);
   const auto begin = Clock::now();
   const auto ms = [&] { return std::chrono::duration<double, std::milli>(Clock::now() - begin).count(); };
   page_.open_source(QString::fromStdString(folder));
@@ -121,19 +159,24 @@ bool Reader::opens(const std::string& folder, nlohmann::json& seen) {
   if (!sees("the series", [&] { return idle() && list.isVisible() && list.count() == 1; })) return false;
   seen["listed_ms"] = ms();
   QTest::mouseClick(list.viewport(), Qt::LeftButton, {}, list.visualItemRect(list.item(0)).center());
-  if (!sees("the slices", [&] { return plane().isVisible(); })) return false;
-  seen["read_ms"] = ms();
-  const QImage drawn = plane().grab().toImage();
+  if (!sees("the first slice", [&] { return plane().isVisible(); })) return false;
+  const QImage first = plane().grab().toImage();
   seen["slice_ms"] = ms();
-  std::set<int> greys;
-  for (int y = 0; y < drawn.height(); ++y)
-    for (int x = 0; x < drawn.width(); ++x) greys.insert(qGray(drawn.pixel(x, y)));
-  if (greys.size() < kGreysOfBone) std::fprintf(stderr, "osteon-imaging-page: the first slice is empty\n");
+  if (!sees("the slices", [&] { return plane().isEnabled(); })) return false;
+  seen["read_ms"] = ms();
+  std::size_t greys = std::numeric_limits<std::size_t>::max();
+  for (const char* name : {"plane_axial", "plane_coronal", "plane_sagittal"})
+    greys = std::min(greys, greys_of(part<QWidget>(name).grab().toImage()));
+  seen["planes_ms"] = ms();
+  seen["difference"] = difference_of(first, plane(), middle);
   double voxels = 1.0;
   for (const char* slices : {"slice_axial", "slice_coronal", "slice_sagittal"})
     voxels *= part<QSlider>(slices).maximum() + 1;
   seen["volume_mb"] = voxels * sizeof(std::int16_t) / (kKbPerMb * kKbPerMb);
-  return greys.size() >= kGreysOfBone;
+  if (greys < kGreysOfBone) std::fprintf(stderr, "osteon-imaging-page: a plane is empty\n");
+  if (seen["difference"] > kMostDifference)
+    std::fprintf(stderr, "osteon-imaging-page: the first slice is not that of the folder\n");
+  return greys >= kGreysOfBone && seen["difference"] <= kMostDifference;
 }
 
 void Reader::drag(const QPoint& from, const QPoint& to) {

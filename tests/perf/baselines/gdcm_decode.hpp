@@ -2,6 +2,7 @@
 #pragma once
 #include <cstdint>
 #include <filesystem>
+#include <vector>
 
 namespace osteon::baselines {
 
@@ -15,5 +16,13 @@ struct GdcmDecoded {
 // One thread. First reads what is before the pixels of every file, and sorts the files by their places. Then decodes
 // each into one volume. Throws std::runtime_error if a file is no slice of the first one's size.
 [[nodiscard]] GdcmDecoded gdcm_decode(const std::filesystem::path& folder);
+
+// The slice number slices / 2 from 0 by its place, HU.
+struct GdcmSlice {
+  int number = 0, columns = 0, rows = 0;
+  std::vector<double> hu;  // columns fastest
+};
+// Throws std::runtime_error if a file is no slice with 16 bits.
+[[nodiscard]] GdcmSlice gdcm_middle_slice(const std::filesystem::path& folder);
 
 }  // namespace osteon::baselines
