@@ -45,18 +45,15 @@ std::vector<std::pair<double, std::filesystem::path>> sorted_slices(const std::f
 
 }  // namespace
 
-GdcmSlice gdcm_middle_slice(const std::filesystem::path& folder) {
+GdcmSlice gdcm_slice(const std::filesystem::path& folder, std::size_t number) {
   const auto files = sorted_slices(folder);
-  if (files.empty()) throw std::runtime_error(folder.string() + " is empty");
-  const auto& [place, file] = files[files.size() / 2];
+  if (number >= files.size()) throw std::runtime_error(folder.string() + " has fewer slices");
+  const std::filesystem::path& file = files[number].second;
   gdcm::ImageReader reader;
   reader.SetFileName(file.c_str());
   if (!reader.Read()) throw std::runtime_error(file.string() + " has no picture");
   const gdcm::Image& image = reader.GetImage();
-  GdcmSlice slice{static_cast<int>(files.size() / 2),
-                  static_cast<int>(image.GetDimension(0)),
-                  static_cast<int>(image.GetDimension(1)),
-                  {}};
+  GdcmSlice slice{static_cast<int>(image.GetDimension(0)), static_cast<int>(image.GetDimension(1)), {}};
   std::vector<std::uint16_t> stored(image.GetBufferLength() / sizeof(std::uint16_t));
   if (image.GetPixelFormat().GetBitsAllocated() != 16 || !image.GetBuffer(reinterpret_cast<char*>(stored.data())))
     throw std::runtime_error(file.string() + " cannot be decoded");

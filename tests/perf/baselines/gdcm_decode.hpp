@@ -1,5 +1,6 @@
 // What GDCM needs for the voxels of a folder of DICOM slices, used as its examples show.
 #pragma once
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <vector>
@@ -17,12 +18,11 @@ struct GdcmDecoded {
 // each into one volume. Throws std::runtime_error if a file is no slice of the first one's size.
 [[nodiscard]] GdcmDecoded gdcm_decode(const std::filesystem::path& folder);
 
-// The slice number slices / 2 from 0 by its place, HU.
 struct GdcmSlice {
-  int number = 0, columns = 0, rows = 0;
+  int columns = 0, rows = 0;
   std::vector<double> hu;  // columns fastest
 };
-// Throws std::runtime_error if a file is no slice with 16 bits.
-[[nodiscard]] GdcmSlice gdcm_middle_slice(const std::filesystem::path& folder);
+// The slice of that number from 0 by its place. Throws std::runtime_error if there is none, or it has not 16 bits.
+[[nodiscard]] GdcmSlice gdcm_slice(const std::filesystem::path& folder, std::size_t number);
 
 }  // namespace osteon::baselines
