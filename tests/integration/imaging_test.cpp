@@ -389,14 +389,13 @@ TEST_F(ImagingTest, EachStepCanBeCancelled) {
   EXPECT_EQ(ticks(), (std::vector<bool>{false, true}));
 }
 
-// Nothing of the test lets the event loop turn after the click, so the child has only begun.
+// Nothing lets the event loop turn after the click, so the child has only begun, and there is no scan to read yet.
 TEST_F(ImagingTest, TheFirstSliceIsSeenBeforeTheOthersAreRead) {
   window_->process_images(QString::fromStdString(series("ct", two_balls()).string()));
   auto& list = part<QListWidget>("series");
   ASSERT_TRUE(until([&] { return idle() && list.isVisible() && list.count() == 1; })) << words();
   choose_series(list);
   EXPECT_FALSE(idle());
-  EXPECT_EQ(children("osteon-import").size(), 1u);
   EXPECT_FALSE(fs::exists(scratch() / "scan.nrrd"));
   ImagingPlane &axial = plane("plane_axial"), &coronal = plane("plane_coronal");
   ASSERT_TRUE(axial.isVisible());
