@@ -49,7 +49,7 @@ struct CaseArguments {
   double margin_mm = CtOptions{}.margin_mm;
   double density_g_cm3 = 1.9, metal_hu = CtOptions{}.metal_hu;
   bool rescale_hu = false, json = false, separate = false, merge = false, hollow = false, list = false,
-       adaptive = false;
+       adaptive = false, with_hu = false;
 };
 
 // "all", or numbers such as "1,3". Empty: the largest that is bone.
@@ -331,7 +331,7 @@ Result<std::string> run_series(const CaseArguments& a, const StopSignal& stop) {
   if (!a.out.empty())
     if (auto is_free = check_free(a.out); !is_free) return tl::unexpected(is_free.error());
   const auto report =
-      a.out.empty() ? list_dicom_series(a.input, searching) : draw_dicom_series(a.input, a.out, searching);
+      a.out.empty() ? list_dicom_series(a.input, searching) : draw_dicom_series(a.input, a.out, a.with_hu, searching);
   if (!report) return tl::unexpected(report.error());
   return a.json ? list_json(*report) : list_text(*report);
 }
@@ -671,7 +671,9 @@ void add_case_commands(CLI::App& app, std::vector<Command>& commands) {
   CLI::App* series = app.add_subcommand("series", "List the CT series of a folder, zip or ISO image");
   series->add_option("INPUT", a.input, "Folder (with all its subfolders), zip or ISO image")->required();
   series->add_flag("--json", a.json, "For programs");
-  series->add_option("--pictures", a.out, "Folder, made by this command: the middle slice of each series as PNG");
+  CLI::Option* pictures =
+      series->add_option("--pictures", a.out, "Folder, made by this command: the middle slice of each series as PNG");
+  series->add_flag("--with-hu", a.with_hu, "Of these slices write the HU too, as NRRD")->needs(pictures);
   commands.push_back({series, [shared](const StopSignal& stop) { return run_series(*shared, stop); }});
 
   CLI::App* labels =

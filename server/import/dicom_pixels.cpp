@@ -87,6 +87,21 @@ Result<void> PixelReader::decode(const DicomHeader& h, const fs::path& file, con
   return {};
 }
 
+std::int16_t PixelReader::Scale::hu(std::uint16_t raw) const {
+  if (raw == padding) return kPadding_hu;
+  // Signed values may lack their sign in the bits above the stored ones.
+  const int stored = is_signed ? static_cast<std::int16_t>(static_cast<std::uint16_t>(raw << unused)) >> unused : raw;
+  return imaging::nearest_hu(stored * slope + intercept);
+}
+
+// A slice has more pixels than there are values, and its neighbour mostly has the same scale.
+void PixelReader::set_scale(const Scale& scale) {
+  if (scale == scale_ && !hu_.empty()) return;
+  scale_ = scale;
+  hu_.resize(std::size_t{1} << 16);
+  for (std::size_t raw = 0; raw < hu_.size(); ++raw) hu_[raw] = scale.hu(static_cast<std::uint16_t>(raw));
+}
+
 Result<void> PixelReader::read(const DicomHeader& h, const fs::path& file, const std::string& name,
                                std::span<std::int16_t> out) try {
   if (file_ != file)
@@ -98,16 +113,13 @@ Result<void> PixelReader::read(const DicomHeader& h, const fs::path& file, const
   // Padding counts as air, but only if it would be bright: some files name a value that real pixels have too.
   const bool has_padding = h.padding.size() == 1 && std::abs(h.padding[0]) <= kLargestStored &&
                            h.padding[0] * h.slope[0] + h.intercept[0] > kBrightPadding_hu;
-  const auto padding =
-      has_padding ? static_cast<std::uint16_t>(static_cast<std::int64_t>(h.padding[0])) : std::uint16_t{0};
+  Scale scale{h.slope[0], h.intercept[0], is_signed_, unused_, {}};
+  if (has_padding) scale.padding = static_cast<std::uint16_t>(static_cast<std::int64_t>(h.padding[0]));
+  set_scale(scale);
   for (std::size_t i = 0; i < out.size(); ++i) {
     std::uint16_t raw = static_cast<std::uint8_t>(buffer[i]);
     if (width_ == 2) std::memcpy(&raw, buffer.data() + 2 * i, 2);
-    // Signed values may lack their sign in the bits above the stored ones.
-    const int stored =
-        is_signed_ ? static_cast<std::int16_t>(static_cast<std::uint16_t>(raw << unused_)) >> unused_ : raw;
-    const double hu = stored * h.slope[0] + h.intercept[0];
-    out[i] = has_padding && raw == padding ? kPadding_hu : imaging::nearest_hu(hu);
+    out[i] = hu_[raw];
   }
   return {};
 } catch (const std::bad_alloc&) {

@@ -16,6 +16,7 @@
 #include "server/import/dicom_series.hpp"
 #include "server/import/import_steps.hpp"
 #include "server/import/isolated_reader.hpp"
+#include "server/import/raw_nrrd.hpp"
 #include "server/import/slice_images.hpp"
 
 namespace osteon::import {
@@ -283,10 +284,12 @@ Result<SeriesReport> report_of(Survey found) {
   return report;
 }
 
+std::size_t middle_of(const CtSeries& series) { return series.slices.size() / 2; }
+
 // The HU of the slice in the middle. Errors: invalid_input (damaged), cancelled.
 Result<std::vector<std::int16_t>> middle_slice(const CtSeries& series, const FoundFiles& found,
                                                const KeepGoing& keep_going) {
-  const DicomHeader& header = series.slices[series.slices.size() / 2];
+  const DicomHeader& header = series.slices[middle_of(series)];
   std::vector<std::int16_t> hu(static_cast<std::size_t>(series.entry.columns) *
                                static_cast<std::size_t>(series.entry.rows));
   IsolatedWork work;
@@ -308,8 +311,19 @@ Result<std::vector<std::int16_t>> middle_slice(const CtSeries& series, const Fou
   return hu;
 }
 
+// Of one slice at its place among the others. The slices are the planes of the series' grid.
+Result<void> write_slice(const CtSeries& series, const std::vector<std::int16_t>& hu, const fs::path& file) {
+  const imaging::HuVolume& all = series.grid.volume;
+  imaging::HuVolume one;
+  one.dims = {all.dims[0], all.dims[1], 1};
+  one.spacing_mm = all.spacing_mm;
+  one.directions = all.directions;
+  one.origin_mm = all.position_mm({0.0, 0.0, static_cast<double>(middle_of(series))});
+  return write_raw_nrrd(one, hu, file, [](double) { return true; });
+}
+
 // Errors: internal (disk), cancelled.
-Result<void> draw_all(const Survey& survey, const fs::path& folder, const KeepGoing& keep_going) {
+Result<void> draw_all(const Survey& survey, const fs::path& folder, bool with_hu, const KeepGoing& keep_going) {
   const auto count = static_cast<double>(survey.series.size());
   double done = 0.0;
   for (const CtSeries& series : survey.series) {
@@ -320,8 +334,11 @@ Result<void> draw_all(const Survey& survey, const fs::path& folder, const KeepGo
     done += 1.0;
     if (!hu && hu.error().code == ErrorCode::cancelled) return tl::unexpected(hu.error());
     if (!hu || hu->empty()) continue;
-    const fs::path file = folder / ("series-" + std::to_string(series.entry.number) + ".png");
-    if (auto written = write_slice_image(*hu, series.entry.columns, imaging::Window{}, file); !written) return written;
+    const std::string name = "series-" + std::to_string(series.entry.number);
+    if (auto drawn = write_slice_image(*hu, series.entry.columns, imaging::Window{}, folder / (name + ".png")); !drawn)
+      return drawn;
+    if (!with_hu || !series.grid.places.empty()) continue;
+    if (auto written = write_slice(series, *hu, folder / (name + ".nrrd")); !written) return written;
   }
   return {};
 }
@@ -357,12 +374,14 @@ Result<SeriesReport> list_dicom_series(const fs::path& input, const KeepGoing& k
   return report_of(std::move(*found));
 }
 
-Result<SeriesReport> draw_dicom_series(const fs::path& input, const fs::path& folder, const KeepGoing& keep_going) {
+Result<SeriesReport> draw_dicom_series(const fs::path& input, const fs::path& folder, bool with_hu,
+                                       const KeepGoing& keep_going) {
   auto found = survey(input, keep_going);
   if (!found) return tl::unexpected(found.error());
   if (const auto chosen = choose(*found, {}); !chosen) return tl::unexpected(chosen.error());
-  auto written = write_new_folder(
-      folder, [&](const fs::path& partial) { return draw_all(*found, partial, part(keep_going, kHeadersEnd, 1.0)); });
+  auto written = write_new_folder(folder, [&](const fs::path& partial) {
+    return draw_all(*found, partial, with_hu, part(keep_going, kHeadersEnd, 1.0));
+  });
   if (!written) return tl::unexpected(written.error());
   return report_of(std::move(*found));
 }

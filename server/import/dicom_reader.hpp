@@ -31,9 +31,11 @@ struct SeriesOptions {
 [[nodiscard]] Result<SeriesReport> list_dicom_series(const std::filesystem::path& input, const KeepGoing& keep_going);
 
 // The same. Makes the folder, which must not exist, with series-N.png for each series N that can be imported: its
-// middle slice in the window of bone. A series of which that slice cannot be read has no picture. Errors: those above,
-// exists.
+// middle slice in the window of bone. A series of which that slice cannot be read has no picture. `with_hu`: the HU of
+// that slice, number slices / 2 from 0, too, in series-N.nrrd (server/import/raw_nrrd.hpp). A series that is resampled
+// has none, because its slices are no planes of its volume. Errors: those above, exists.
 [[nodiscard]] Result<SeriesReport> draw_dicom_series(const std::filesystem::path& input,
-                                                     const std::filesystem::path& folder, const KeepGoing& keep_going);
+                                                     const std::filesystem::path& folder, bool with_hu,
+                                                     const KeepGoing& keep_going);
 
 }  // namespace osteon::import

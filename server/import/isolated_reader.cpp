@@ -27,6 +27,7 @@ namespace {
 
 constexpr int kPollMilliseconds = 20;
 constexpr int kPatienceMilliseconds = 120'000;  // counts polls without data, so a suspended process loses no time
+constexpr int kPipe_bytes = 1 << 20;            // a slice of 512 x 512 at once
 constexpr std::size_t kLargestMessage = std::size_t{1} << 30;  // a slice of 16384 x 16384 is half of it
 
 // The child's messages: the file that it opens, its progress, a part of the result, and finally how it ended.
@@ -205,6 +206,7 @@ IsolatedEnd run_isolated(const IsolatedWork& work, const KeepGoing& keep_going) 
     return {.result = failure(ErrorCode::internal, std::string("cannot make a pipe: ") + std::strerror(errno)),
             .died = false,
             .file = {}};
+  ::fcntl(ends[1], F_SETPIPE_SZ, kPipe_bytes);  // refused for a user with many pipes: it is slower then
   std::fflush(nullptr);
   const pid_t parent = ::getpid();
   const pid_t child = ::fork();

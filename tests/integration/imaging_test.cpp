@@ -4,6 +4,7 @@
 
 #include <QApplication>
 #include <QComboBox>
+#include <QCoreApplication>
 #include <QDockWidget>
 #include <QFileDialog>
 #include <QLabel>
@@ -18,6 +19,7 @@
 #include <algorithm>
 #include <array>
 #include <filesystem>
+#include <set>
 #include <string>
 
 #include "common/volume/case.hpp"
@@ -35,6 +37,8 @@ namespace {
 namespace fs = std::filesystem;
 using namespace std::chrono_literals;
 using test::children;
+using test::kBall_hu;
+using test::kMuscle_hu;
 using test::two_balls;
 
 class ImagingTest : public test::ImagingBench {
@@ -80,6 +84,11 @@ class ImagingTest : public test::ImagingBench {
   }
   int clicks_ = 0;
 };
+
+// The scratch folder of this program's page.
+fs::path scratch() {
+  return cases_folder() / (".partial-imaging-" + std::to_string(QCoreApplication::applicationPid()));
+}
 
 // Chooses a folder in the next dialog, as two clicks do.
 class FolderChooser : public QObject {
@@ -378,6 +387,70 @@ TEST_F(ImagingTest, EachStepCanBeCancelled) {
   cancel();
   EXPECT_EQ(test::names_in(cases_folder()), before);
   EXPECT_EQ(ticks(), (std::vector<bool>{false, true}));
+}
+
+// Nothing lets the event loop turn after the click, so the child has only begun, and there is no scan to read yet.
+TEST_F(ImagingTest, TheFirstSliceIsSeenBeforeTheOthersAreRead) {
+  window_->process_images(QString::fromStdString(series("ct", two_balls()).string()));
+  auto& list = part<QListWidget>("series");
+  ASSERT_TRUE(until([&] { return idle() && list.isVisible() && list.count() == 1; })) << words();
+  choose_series(list);
+  EXPECT_FALSE(idle());
+  EXPECT_FALSE(fs::exists(scratch() / "scan.nrrd"));
+  ImagingPlane &axial = plane("plane_axial"), &coronal = plane("plane_coronal");
+  ASSERT_TRUE(axial.isVisible());
+  EXPECT_EQ(axial.slice(), 12);
+  EXPECT_EQ(part<QSlider>("slice_axial").maximum(), 23);
+  EXPECT_NE(words().find("middle slice"), std::string::npos) << words();
+  // Bone and muscle in a window of 2000 HU about 500 HU, beside the lines of the crosshair.
+  const auto [column, row, slice] = ball(1);
+  const auto grey = [](ImagingPlane& of, const std::array<int, 3>& voxel) {
+    return qGray(of.grab().toImage().pixel(of.pixel(voxel)));
+  };
+  EXPECT_NEAR(grey(axial, {column, row + 3, slice}), 255.0 * ((kBall_hu - 500.0) / 2000.0 + 0.5), 1.0);
+  EXPECT_NEAR(grey(axial, {column, row + 14, slice}), 255.0 * ((kMuscle_hu - 500.0) / 2000.0 + 0.5), 1.0);
+  EXPECT_EQ(grey(coronal, {column, row, slice + 4}), 0) << "it waits";
+  // No tool works on a scan that is not there.
+  for (const char* name : {"plane_axial", "slice_axial", "threshold", "window_preset", "tool_paint", "keep_bone"})
+    EXPECT_FALSE(part<QWidget>(name).isEnabled()) << name;
+  part<QSlider>("slice_axial").setValue(3);
+  EXPECT_EQ(axial.slice(), 12);
+  ASSERT_TRUE(until([&] { return found(2); })) << words();
+  for (const char* name : {"plane_axial", "plane_coronal", "threshold", "window_preset", "tool_paint", "keep_bone"})
+    EXPECT_TRUE(part<QWidget>(name).isEnabled()) << name;
+  EXPECT_GT(grey(coronal, {column, row, slice + 4}), 0);
+}
+
+TEST_F(ImagingTest, CancelAfterTheFirstSliceLeavesTheListAlone) {
+  window_->process_images(QString::fromStdString(series("ct", two_balls()).string()));
+  auto& list = part<QListWidget>("series");
+  ASSERT_TRUE(until([&] { return idle() && list.isVisible() && list.count() == 1; })) << words();
+  choose_series(list);
+  ASSERT_TRUE(plane("plane_axial").isVisible());
+  click("imaging_cancel");
+  EXPECT_EQ(refused(), "Cancelled. Nothing was written.");
+  EXPECT_TRUE(list.isVisible());
+  EXPECT_TRUE(list.hasFocus());
+  EXPECT_TRUE(children("osteon-import").empty());
+  EXPECT_EQ(test::names_in(scratch()), std::set<std::string>{"pictures"});
+  choose_series(list);
+  ASSERT_TRUE(until([&] { return found(2); })) << words();
+}
+
+TEST_F(ImagingTest, ADamagedLastSliceIsRefusedAfterTheFirstWasSeen) {
+  const fs::path folder = series("damaged", two_balls());
+  const fs::path last = folder / "slice-0024.dcm";
+  fs::resize_file(last, fs::file_size(last) - 100);
+  window_->process_images(QString::fromStdString(folder.string()));
+  auto& list = part<QListWidget>("series");
+  ASSERT_TRUE(until([&] { return idle() && list.isVisible() && list.count() == 1; })) << words();
+  choose_series(list);
+  EXPECT_TRUE(plane("plane_axial").isVisible());
+  EXPECT_NE(refused().find("slice-0024.dcm is cut off"), std::string::npos) << words();
+  EXPECT_TRUE(list.isVisible());
+  EXPECT_FALSE(plane("plane_axial").isVisible());
+  EXPECT_EQ(test::names_in(scratch()), std::set<std::string>{"pictures"});
+  open_scan(series("ct", two_balls()), 2);
 }
 
 TEST_F(ImagingTest, AWindowThatIsClosedLeavesNoScanBehind) {

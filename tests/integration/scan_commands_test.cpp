@@ -7,6 +7,8 @@
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <set>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -153,6 +155,15 @@ TEST_F(ScanCommands, EachSeriesHasAPicture) {
   EXPECT_EQ(names_in(folder_ / "pictures"), std::set<std::string>{"series-1.png"});
   EXPECT_EQ(content(folder_ / "pictures" / "series-1.png").substr(1, 3), "PNG");
   refused({"series", path("ct"), "--pictures", path("pictures")}, "pictures");
+  EXPECT_NE(start({"series", path("ct"), "--with-hu"}).exit_code, 0) << "there is no folder for them";
+  ASSERT_EQ(start({"series", path("ct"), "--with-hu", "--pictures", path("both")}).exit_code, 0);
+  EXPECT_EQ(names_in(folder_ / "both"), (std::set<std::string>{"series-1.nrrd", "series-1.png"}));
+  const auto slice = read_scan_file(folder_ / "both" / "series-1.nrrd");
+  ASSERT_TRUE(slice) << slice.error().message;
+  EXPECT_EQ(slice->geometry.dims, (std::array<int, 3>{balls_.dims[0], balls_.dims[1], 1}));
+  EXPECT_LT((slice->geometry.origin_mm - balls_.position_mm(Vec3(0, 0, 12))).norm(), 1e-6);
+  EXPECT_TRUE(std::ranges::equal(slice->values,
+                                 std::span(balls_.values).subspan(12 * slice->values.size(), slice->values.size())));
   fs::create_directory(folder_ / "empty");
   refused({"series", path("empty"), "--pictures", path("none")}, "empty");
 }

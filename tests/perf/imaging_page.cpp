@@ -1,8 +1,9 @@
 // What the page of image processing costs with a folder of DICOM slices, on a screen of its own, with osteon-import as
-// its child. `slice FOLDER`: from the folder to the first slice that is drawn, with a person who chooses its only
-// series at once. `segment FOLDER`: memory while a person keeps parts, paints, erases, cuts, changes the threshold and
-// the filter, and undoes and does all of it again. `decode FOLDER`: GDCM alone, which reads the headers and decodes
-// every slice once. Prints JSON.
+// its child. `slice FOLDER`: from the folder to the first slice that is drawn, the middle one, with a person who
+// chooses its only series at once, and to all three planes. The first slice is compared with what GDCM reads. `segment
+// FOLDER`: memory while a person keeps parts, paints, erases, cuts, changes the threshold and the filter, and undoes
+// and does all of it again. `decode FOLDER`: GDCM alone, which reads the headers and decodes every slice once. Prints
+// JSON.
 #include <QCheckBox>
 #include <QComboBox>
 #include <QDoubleSpinBox>
@@ -15,6 +16,7 @@
 #include <QToolButton>
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <cstdio>
 #include <exception>
 #include <filesystem>
@@ -23,6 +25,7 @@
 #include <set>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "tests/integration/desk.hpp"
 #include "tests/integration/window_bench.hpp"
@@ -37,7 +40,9 @@ using Clock = std::chrono::steady_clock;
 
 constexpr double kKbPerMb = 1024.0;
 constexpr int kStrokes = 60;
-constexpr std::size_t kGreysOfBone = 50;  // a slice that is drawn has more, an empty one a few
+constexpr std::size_t kGreysOfBone = 50;  // a plane that is drawn has more, an empty one a few
+constexpr double kNearer = 0.95;          // the noise of the slices differs, their bone hardly
+constexpr int kCompared = 3;              // each third voxel along both axes
 
 // A line of a process's status, MB; 0 without it. `process`: a number, or "self".
 double status_mb(const std::string& process, std::string_view line_name) {
@@ -66,6 +71,38 @@ class Memory {
   double together_mb_ = 0.0;
 };
 
+std::size_t greys_of(const QImage& drawn) {
+  std::set<int> greys;
+  for (int y = 0; y < drawn.height(); ++y)
+    for (int x = 0; x < drawn.width(); ++x) greys.insert(qGray(drawn.pixel(x, y)));
+  return greys.size();
+}
+
+// The mean difference in greys of a picture of the plane from a slice in the window of bone, by DICOM's formula for a
+// window of 2000 HU about 500 HU. The picture is smaller than the slice, so that pixels are compared with the mean of
+// 3 x 3 voxels. `number`: of the slice that the plane is at.
+double difference_of(const QImage& drawn, const ImagingPlane& plane, const baselines::GdcmSlice& slice, int number) {
+  const auto grey = [&](int column, int row) {
+    double sum = 0.0;
+    for (int down = -1; down <= 1; ++down)
+      for (int right = -1; right <= 1; ++right) {
+        const double hu = slice.hu[static_cast<std::size_t>((row + down) * slice.columns + column + right)];
+        sum += 255.0 * std::clamp((hu - 500.0) / 2000.0 + 0.5, 0.0, 1.0);
+      }
+    return sum / 9.0;
+  };
+  double sum = 0.0;
+  int count = 0;
+  for (int row = 1; row < slice.rows - 1; row += kCompared)
+    for (int column = 1; column < slice.columns - 1; column += kCompared) {
+      const QPoint at = plane.pixel({column, row, number});
+      if (!drawn.valid(at)) return 255.0;
+      sum += std::abs(qGray(drawn.pixel(at)) - grey(column, row));
+      ++count;
+    }
+  return count > 0 ? sum / count : 255.0;
+}
+
 // Each step returns false, after a message, if the page did not do what it should.
 class Reader {
  public:
@@ -75,6 +112,8 @@ class Reader {
     (void)QTest::qWaitForWindowExposed(&page_, 30000);
   }
   bool opens(const std::string& folder, nlohmann::json& seen);
+  // Whether the first slice that was drawn is the one in the middle by GDCM's places, and not one beside it.
+  bool saw_the_middle(const std::string& folder, nlohmann::json& seen) const;
   bool segments(nlohmann::json& seen);
 
  private:
@@ -111,6 +150,7 @@ class Reader {
 
   ImagingPage page_;
   Memory memory_;
+  QImage first_;
 };
 
 bool Reader::opens(const std::string& folder, nlohmann::json& seen) {
@@ -121,19 +161,35 @@ bool Reader::opens(const std::string& folder, nlohmann::json& seen) {
   if (!sees("the series", [&] { return idle() && list.isVisible() && list.count() == 1; })) return false;
   seen["listed_ms"] = ms();
   QTest::mouseClick(list.viewport(), Qt::LeftButton, {}, list.visualItemRect(list.item(0)).center());
-  if (!sees("the slices", [&] { return plane().isVisible(); })) return false;
-  seen["read_ms"] = ms();
-  const QImage drawn = plane().grab().toImage();
+  if (!sees("the first slice", [&] { return plane().isVisible(); })) return false;
+  first_ = plane().grab().toImage();
   seen["slice_ms"] = ms();
-  std::set<int> greys;
-  for (int y = 0; y < drawn.height(); ++y)
-    for (int x = 0; x < drawn.width(); ++x) greys.insert(qGray(drawn.pixel(x, y)));
-  if (greys.size() < kGreysOfBone) std::fprintf(stderr, "osteon-imaging-page: the first slice is empty\n");
+  if (!sees("the slices", [&] { return plane().isEnabled(); })) return false;
+  seen["read_ms"] = ms();
+  std::vector<QImage> planes;
+  for (const char* name : {"plane_axial", "plane_coronal", "plane_sagittal"})
+    planes.push_back(part<QWidget>(name).grab().toImage());
+  seen["planes_ms"] = ms();
   double voxels = 1.0;
   for (const char* slices : {"slice_axial", "slice_coronal", "slice_sagittal"})
     voxels *= part<QSlider>(slices).maximum() + 1;
   seen["volume_mb"] = voxels * sizeof(std::int16_t) / (kKbPerMb * kKbPerMb);
-  return greys.size() >= kGreysOfBone;
+  const bool drawn = std::ranges::all_of(planes, [](const QImage& of) { return greys_of(of) >= kGreysOfBone; });
+  if (!drawn) std::fprintf(stderr, "osteon-imaging-page: a plane is empty\n");
+  return drawn;
+}
+
+bool Reader::saw_the_middle(const std::string& folder, nlohmann::json& seen) const {
+  const int middle = (part<QSlider>("slice_axial").maximum() + 1) / 2;
+  const auto difference = [&](int number) {
+    return difference_of(first_, plane(), baselines::gdcm_slice(folder, static_cast<std::size_t>(number)), middle);
+  };
+  const double own = difference(middle), others = std::min(difference(middle - 1), difference(middle + 1));
+  seen["difference"] = own;
+  seen["difference_of_neighbours"] = others;
+  if (own < kNearer * others) return true;
+  std::fprintf(stderr, "osteon-imaging-page: the first slice is not that in the middle of the folder\n");
+  return false;
 }
 
 void Reader::drag(const QPoint& from, const QPoint& to) {
@@ -232,7 +288,8 @@ int show(const std::string& folder, bool segments) {
   nlohmann::json seen{{"steps", nlohmann::json::array()}};
   Reader reader;
   seen["before_mb"] = status_mb("self", "VmRSS:");
-  const bool done = reader.opens(folder, seen) && (!segments || reader.segments(seen));
+  const bool done =
+      reader.opens(folder, seen) && (segments ? reader.segments(seen) : reader.saw_the_middle(folder, seen));
   std::printf("%s\n", seen.dump().c_str());
   return done ? 0 : 1;
 }

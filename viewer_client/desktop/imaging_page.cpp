@@ -68,12 +68,12 @@ ImagingPage::ImagingPage(Events events, QWidget* parent)
   connect(series_list_, &QListWidget::itemClicked, this, [this](QListWidgetItem* item) { read_row(item); });
   connect(series_list_, &QListWidget::itemActivated, this, [this](QListWidgetItem* item) { read_row(item); });
   stack_->addWidget(series_list_);
-  auto* work = new QWidget;
-  work->setLayout(make_work());
+  work_area_ = new QWidget;
+  work_area_->setLayout(make_work());
   auto* scrolled = new QScrollArea;  // a small screen has no room for tools, planes and panels of the window
   scrolled->setWidgetResizable(true);
   scrolled->setFrameShape(QFrame::NoFrame);
-  scrolled->setWidget(work);
+  scrolled->setWidget(work_area_);
   stack_->addWidget(scrolled);
 
   auto* all = new QVBoxLayout(this);
@@ -104,6 +104,7 @@ ImagingSteps::Events ImagingPage::step_events() {
           [this](const QString& sentence) {
             events_.busy(false);
             if (scene_.look.edges.values.empty()) show_edges({});
+            if (scene_.waits()) forget_first();
             end_work(sentence.isEmpty() ? tr("Cancelled. Nothing was written.") : sentence);
             if (!wanted_source_.isEmpty()) return open_source(std::exchange(wanted_source_, {}));
             if (std::exchange(wants_islands_, false)) find_islands();
@@ -290,6 +291,7 @@ void ImagingPage::open_source(const QString& source) {
   wants_islands_ = false;
   solid_->release();
   scene_.scan = {};
+  scene_.first = {};
   scene_.islands = {};
   islands_.clear();
   series_.clear();
@@ -347,21 +349,48 @@ void ImagingPage::read_row(const QListWidgetItem* item) {
   if (steps_.busy() || !series_list_->isVisible() || row >= series_.size()) return;
   show_work(tr("Reading the series"));
   steps_.read(series_[row].number);
+  if (steps_.busy()) show_first(series_[row]);
+}
+
+void ImagingPage::show_first(const ListedSeries& of) {
+  Result<ShownScan> first = read_scan_file(of.hu.toStdString());
+  if (!first || first->geometry.dims[2] != 1) return;
+  const int middle = of.slices / 2;
+  scene_.scan.geometry = first->geometry;
+  scene_.scan.geometry.dims[2] = of.slices;
+  scene_.scan.geometry.origin_mm -= middle * first->geometry.axes_mm.col(2);
+  scene_.first = std::move(*first);
+  histogram_->set_histogram({});
+  begin_planes();
+  show_work(tr("Reading the series. You see its middle slice; the tools wait for the others."));
+}
+
+void ImagingPage::forget_first() {
+  scene_.first = {};
+  scene_.scan = {};
+  stack_->setCurrentIndex(kSeriesPage);
+  series_list_->setFocus();
 }
 
 void ImagingPage::show_scan(ShownScan scan, const HuHistogram& histogram) {
   solid_->release();
   scene_.scan = std::move(scan);
+  scene_.first = {};
   histogram_->set_histogram(histogram);
+  begin_planes();
+  enable_parts();
+  planes_[0]->setFocus();
+  work_.start();
+  find_islands();
+}
+
+void ImagingPage::begin_planes() {
   const auto& dims = scene_.scan.geometry.dims;
   scene_.crosshair = {dims[0] / 2, dims[1] / 2, dims[2] / 2};
   stack_->setCurrentIndex(kWorkPage);
   change_window(kBoneWindow);
   for (ImagingPlane* plane : planes_) plane->begin();
   solid_->begin();
-  planes_[0]->setFocus();
-  work_.start();
-  find_islands();
 }
 
 void ImagingPage::show_filtered(ShownScan scan, const HuHistogram& histogram) {
@@ -411,6 +440,7 @@ void ImagingPage::show_largest_bone() {
 }
 
 void ImagingPage::look_at(const std::array<int, 3>& voxel) {
+  if (!scene_.open()) return;
   scene_.crosshair = voxel;
   refresh_planes();
   point_at(voxel);
@@ -475,6 +505,7 @@ void ImagingPage::enable_parts() {
   const QString wait = tr("osteon-import is at work. Wait for it, or cancel it.");
   const QString none = free ? tr("Find the parts. If there are none, choose another threshold or box.") : wait;
   set_enabled(*back_, !making, wait);
+  set_enabled(*work_area_, !scene_.waits(), wait);
   set_enabled(*threshold_, !making, wait);
   set_enabled(*filter_, !making, wait);
   const bool gaussian = filter_->currentIndex() == kGaussianRow;

@@ -72,6 +72,12 @@ class ImagingPage : public QWidget {
   void end_work(const QString& sentence);
   void show_series(const std::vector<ListedSeries>& series);
   void read_row(const QListWidgetItem* item);
+  // While the series is being read: its middle slice. Nothing, if the list has none.
+  void show_first(const ListedSeries& of);
+  // All planes and the picture in three dimensions, with the middle of the scan.
+  void begin_planes();
+  // It was not read: back to the list.
+  void forget_first();
   void show_scan(ShownScan scan, const HuHistogram& histogram);
   void show_filtered(ShownScan scan, const HuHistogram& histogram);
   void show_islands(std::vector<ListedIsland> list, IslandMap map);
@@ -157,6 +163,7 @@ class ImagingPage : public QWidget {
   bool filling_ = false;        // the list changes by itself
   std::vector<ListedSeries> series_;
   QStackedWidget* stack_;
+  QWidget* work_area_;
   QListWidget *series_list_, *island_list_;
   QLabel *words_, *readout_;
   QProgressBar* progress_;

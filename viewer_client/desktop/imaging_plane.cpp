@@ -67,7 +67,7 @@ void ImagingPlane::begin() {
 }
 
 void ImagingPlane::refresh() {
-  if (!scene_.open()) return;
+  if (!scene_.open() && !scene_.waits()) return;
   drawn_slice_ = -1;
   const QSignalBlocker quiet(slider_);
   slider_->setValue(slice());
@@ -89,14 +89,23 @@ std::array<int, 3> ImagingPlane::voxel_under(const QPoint& at) const {
   return voxel_at(axes_, column, row, slice());
 }
 
+std::vector<std::uint32_t> ImagingPlane::draw() const {
+  if (scene_.open()) return draw_plane(scene_.scan, scene_.islands, axes_, slice(), scene_.look, scene_.greys);
+  return draw_plane(scene_.first, {}, axes_of(scene_.first.geometry, plane_), 0, scene_.look, scene_.greys);
+}
+
 void ImagingPlane::paintEvent(QPaintEvent* /*event*/) {
   QPainter painter(this);
   const PlaneFrame at = frame();
   const QRectF all(0, 0, width() - slider_->width() - kPlaneMargin_px, height());
   painter.fillRect(all, Qt::black);
-  if (!scene_.open()) return;
+  if (!shows()) {
+    painter.setPen(kLetter);
+    if (scene_.waits()) painter.drawText(all, Qt::AlignCenter | Qt::TextWordWrap, tr("Waits for the other slices"));
+    return;
+  }
   if (drawn_slice_ != slice()) {
-    pixels_ = draw_plane(scene_.scan, scene_.islands, axes_, slice(), scene_.look, scene_.greys);
+    pixels_ = draw();
     drawn_slice_ = slice();
   }
   const QImage image(reinterpret_cast<const uchar*>(pixels_.data()), axes_.columns, axes_.rows,

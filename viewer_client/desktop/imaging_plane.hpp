@@ -17,7 +17,9 @@ namespace osteon {
 
 // What the three planes show together.
 struct ImagingScene {
-  ShownScan scan;  // without voxels: none is open
+  ShownScan scan;  // without voxels: none is open, or it is being read
+  // The slice in the middle of a scan that is being read; `scan` says where all lie. Without voxels: there is none.
+  ShownScan first;
   IslandMap islands;
   PlaneLook look;
   GreyTable greys{HuWindow{}};
@@ -36,12 +38,14 @@ struct ImagingScene {
   std::vector<LandmarkMark> landmarks;
 
   [[nodiscard]] bool open() const { return !scan.values.empty(); }
+  [[nodiscard]] bool waits() const { return !open() && !first.values.empty(); }
 };
 
 // [GUI thread] The left button moves the crosshair, a double click keeps the bone there, the right button drags the
 // window, and the wheel goes through the slices. Arrow keys, page keys and Enter do the same. With another tool the
 // left button drags the tool. On the keyboard, the space bar begins and ends that drag at the crosshair, and Escape
-// takes it back. A drag also ends when the plane loses the focus.
+// takes it back. A drag also ends when the plane loses the focus. While a scan is being read, the plane along its
+// slices shows the one in the middle, and the others say that they wait.
 class ImagingPlane : public QWidget {
   Q_DECLARE_TR_FUNCTIONS(ImagingPlane)
 
@@ -90,11 +94,15 @@ class ImagingPlane : public QWidget {
   [[nodiscard]] bool has_brush() const {
     return scene_.tool == ImagingTool::paint || scene_.tool == ImagingTool::erase;
   }
+  // Whether there is a slice to see.
+  [[nodiscard]] bool shows() const { return scene_.open() || (scene_.waits() && axes_.through == kSlices); }
+  [[nodiscard]] std::vector<std::uint32_t> draw() const;
   // Crosshair, box, seeds and brush.
   void paint_marks(QPainter& painter, const PlaneFrame& at) const;
   // Those in this slice, with their names.
   void paint_landmarks(QPainter& painter, const PlaneFrame& at) const;
 
+  static constexpr int kSlices = 2;  // axis of the voxels, through the slices of the scanner
   Plane plane_;
   const ImagingScene& scene_;
   Events events_;

@@ -112,6 +112,7 @@ void ImagingSolid::begin() {
   cross_.reset();
   view_->set_bounds(corners_of(scene_.scan.geometry));
   view_->look_overview();
+  show_state();
   refresh();
 }
 

@@ -48,6 +48,8 @@ ListedSeries listed_series(const QJsonObject& of, int taken, const QString& pict
   series.largest = series.number == taken;
   series.problem = of["problem"].toString();
   series.picture = pictures + QString("/series-%1.png").arg(series.number);
+  series.hu = pictures + QString("/series-%1.nrrd").arg(series.number);
+  series.slices = of["slices"].toInt();
   const QJsonArray spacing = of["spacing_mm"].toArray();
   QString what = QCoreApplication::translate("ImagingSteps", "CT, %1 slices, %2 × %3 pixels")
                      .arg(of["slices"].toInt())
@@ -159,7 +161,7 @@ void ImagingSteps::open(const QString& source) {
   if (!make_scratch())
     return fail(tr("Cannot make the folder %1. Choose a place where you may write.").arg(text_of(scratch_)));
   if (has_one_scan(source)) return read({});
-  start({"series", source, "--json", "--pictures", scratch_file(kPictures)},
+  start({"series", source, "--json", "--with-hu", "--pictures", scratch_file(kPictures)},
         [this](const QString& said) { read_series(said); });
 }
 

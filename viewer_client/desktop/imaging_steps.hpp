@@ -25,7 +25,9 @@ struct ListedSeries {
   int number = 0;
   QString text;     // description, modality, slices, size and pitch
   QString problem;  // why it cannot be read; empty: it can
-  QString picture;  // file; it may not be there
+  QString picture;  // file of the middle slice; it may not be there
+  QString hu;       // file of the HU of the same slice, number slices / 2 from 0; it may not be there
+  int slices = 0;
   bool largest = false;
 };
 

@@ -6,10 +6,19 @@
 namespace osteon {
 
 HuHistogram histogram_of(const ShownScan& scan) {
-  HuHistogram histogram;
-  for (const std::int16_t hu : scan.values)
-    ++histogram.counts[static_cast<std::size_t>(std::clamp((hu - kFirst_hu) / kBin_hu, 0, kBins - 1))];
-  return histogram;
+  const auto bin = [](std::int16_t hu) {
+    return static_cast<std::size_t>(std::clamp((hu - kFirst_hu) / kBin_hu, 0, kBins - 1));
+  };
+  // Neighbours are often alike, and a processor waits for the last sum of a counter. So four histograms take turns.
+  constexpr std::size_t kTurns = 4;
+  std::array<HuHistogram, kTurns> parts;
+  const std::size_t whole = scan.values.size() / kTurns * kTurns;
+  for (std::size_t i = 0; i < whole; i += kTurns)
+    for (std::size_t turn = 0; turn < kTurns; ++turn) ++parts[turn].counts[bin(scan.values[i + turn])];
+  for (std::size_t i = whole; i < scan.values.size(); ++i) ++parts[0].counts[bin(scan.values[i])];
+  for (std::size_t turn = 1; turn < kTurns; ++turn)
+    for (std::size_t i = 0; i < parts[0].counts.size(); ++i) parts[0].counts[i] += parts[turn].counts[i];
+  return parts[0];
 }
 
 std::vector<double> heights_of(const HuHistogram& histogram) {

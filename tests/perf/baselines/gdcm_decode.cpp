@@ -35,15 +35,39 @@ double place_of(const std::filesystem::path& file) {
   return std::inner_product(normal, normal + 3, position.GetValues(), 0.0);
 }
 
-}  // namespace
-
-GdcmDecoded gdcm_decode(const std::filesystem::path& folder) {
-  GdcmDecoded done;
-  const auto begin = Clock::now();
+std::vector<std::pair<double, std::filesystem::path>> sorted_slices(const std::filesystem::path& folder) {
   std::vector<std::pair<double, std::filesystem::path>> files;
   for (const auto& entry : std::filesystem::directory_iterator(folder))
     files.emplace_back(place_of(entry.path()), entry.path());
   std::ranges::sort(files);
+  return files;
+}
+
+}  // namespace
+
+GdcmSlice gdcm_slice(const std::filesystem::path& folder, std::size_t number) {
+  const auto files = sorted_slices(folder);
+  if (number >= files.size()) throw std::runtime_error(folder.string() + " has fewer slices");
+  const std::filesystem::path& file = files[number].second;
+  gdcm::ImageReader reader;
+  reader.SetFileName(file.c_str());
+  if (!reader.Read()) throw std::runtime_error(file.string() + " has no picture");
+  const gdcm::Image& image = reader.GetImage();
+  GdcmSlice slice{static_cast<int>(image.GetDimension(0)), static_cast<int>(image.GetDimension(1)), {}};
+  std::vector<std::uint16_t> stored(image.GetBufferLength() / sizeof(std::uint16_t));
+  if (image.GetPixelFormat().GetBitsAllocated() != 16 || !image.GetBuffer(reinterpret_cast<char*>(stored.data())))
+    throw std::runtime_error(file.string() + " cannot be decoded");
+  const bool is_signed = image.GetPixelFormat().GetPixelRepresentation() == 1;
+  for (const std::uint16_t raw : stored)
+    slice.hu.push_back((is_signed ? static_cast<std::int16_t>(raw) : int{raw}) * image.GetSlope() +
+                       image.GetIntercept());
+  return slice;
+}
+
+GdcmDecoded gdcm_decode(const std::filesystem::path& folder) {
+  GdcmDecoded done;
+  const auto begin = Clock::now();
+  const auto files = sorted_slices(folder);
   done.headers_ms = ms_since(begin);
 
   const auto decoding = Clock::now();

@@ -340,9 +340,12 @@ FIGURES = [
     Figure("c_arm_late_p99", "us", "lateness of ticks meanwhile, 99th percentile, median of all operators",
            "haptic_c_arm", baseline="with a hidden C-arm", full=True),
     # The page of image processing with a DICOM folder of 512 x 512 x 302 voxels.
-    Figure("imaging_first_slice", "ratio", "time from the folder to its first slice on the page, over that of GDCM, "
-           "which reads all headers and decodes all slices once, in turns", "imaging_page", ("<=", 1.5), full=True),
+    Figure("imaging_first_slice", "ratio", "time from the folder to its first slice on the page, the middle one with "
+           "all its HU, over that of GDCM, which reads all headers and decodes all slices once, in turns",
+           "imaging_page", ("<=", 1.5), full=True),
     Figure("imaging_first_slice_time", "s", "the former, median", "imaging_page", baseline="GDCM", full=True),
+    Figure("imaging_three_planes_time", "s", "the same until all slices are read and the three planes drawn",
+           "imaging_page", baseline="GDCM", full=True),
     Figure("imaging_memory", "ratio", "growth of the page's process from before a scan is open to its peak, over the "
            "scan's int16 voxels, while bones are kept, painted, cut and filtered, and all is undone and done again",
            "imaging_page", ("<=", 2.5), full=True),

@@ -289,6 +289,19 @@ TEST(SliceGeometry, MoreShearThanAnyGantryIsRefused) {
   expect_one_sentence(scan.error(), "is sheared by 50.2 degrees, more than a gantry tilts; ");
 }
 
+// A slice of a tilted gantry is no plane of the volume, so a window that shows it before the others would show
+// something else than afterwards.
+TEST(SliceGeometry, OnlyAPlaneOfTheVolumeIsGivenBeforeTheOthers) {
+  const Hu ramp = [](const Vec3& p) { return 100.0 + p.dot(Vec3(7.0, -5.0, 9.0)); };
+  for (const double tilt : {0.0, kTilt_degrees}) {
+    const test::TempDir folder;
+    write_slices(folder / "series", gantry(tilt, std::vector<double>(15, 2.0)), ramp);
+    ASSERT_TRUE(draw_dicom_series(folder / "series", folder / "pictures", true, keep_going));
+    EXPECT_TRUE(fs::exists(folder / "pictures" / "series-1.png"));
+    EXPECT_EQ(fs::exists(folder / "pictures" / "series-1.nrrd"), tilt == 0.0) << tilt;
+  }
+}
+
 TEST(SliceGeometry, ResamplingCanBeStoppedAtAnyMoment) {
   const test::TempDir folder;
   write_slices(folder / "series", gantry(kTilt_degrees, kMixed_mm), [](const Vec3&) { return 40.0; });

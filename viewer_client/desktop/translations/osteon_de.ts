@@ -950,6 +950,10 @@
         <translation>Die Serie wird gelesen</translation>
     </message>
     <message>
+        <source>Reading the series. You see its middle slice; the tools wait for the others.</source>
+        <translation>Die Serie wird gelesen. Sie sehen die mittlere Schicht, die Werkzeuge warten noch.</translation>
+    </message>
+    <message>
         <source>Finding the parts of bone</source>
         <translation>Die Teile aus Knochen werden gesucht</translation>
     </message>
@@ -1124,6 +1128,10 @@
 </context>
 <context>
     <name>ImagingPlane</name>
+    <message>
+        <source>Waits for the other slices</source>
+        <translation>Wartet auf die anderen Schichten</translation>
+    </message>
     <message>
         <source>Coronal plane</source>
         <translation>Koronale Ebene</translation>
