@@ -215,7 +215,7 @@ void ImagingSolid::show_tints() {
     const Tint& tint = scene_.look.bones[static_cast<std::size_t>(bone)];
     if (tint == shown) continue;
     shown = tint;
-    view_->scene().bones().set_look(bone, {tint.red, tint.green, tint.blue}, opacity_of(tint));
+    view_->scene().bones().set_paint(bone, {tint.red, tint.green, tint.blue}, opacity_of(tint));
     view_->redraw();
   }
 }

@@ -17,21 +17,21 @@
 namespace osteon {
 
 struct SolidBones::Impl {
-  struct Look {
+  struct Paint {
     Colour colour{255, 255, 255};
     double opacity = 1.0;
   };
   vtkRenderer& renderer;
   std::map<int, vtkSmartPointer<vtkActor>> surfaces;
-  std::map<int, Look> looks;
+  std::map<int, Paint> paints;
 
   void apply(int bone) {
     const auto found = surfaces.find(bone);
     if (found == surfaces.end()) return;
-    const auto& [colour, opacity] = looks[bone];
-    vtkProperty* paint = found->second->GetProperty();
-    paint->SetColor(colour[0] / 255.0, colour[1] / 255.0, colour[2] / 255.0);
-    paint->SetOpacity(opacity);
+    const auto& [colour, opacity] = paints[bone];
+    vtkProperty* property = found->second->GetProperty();
+    property->SetColor(colour[0] / 255.0, colour[1] / 255.0, colour[2] / 255.0);
+    property->SetOpacity(opacity);
     found->second->SetVisibility(opacity > 0.0 ? 1 : 0);
   }
 };
@@ -56,8 +56,8 @@ void SolidBones::show(int bone, const Mesh& mesh) {
   impl_->apply(bone);
 }
 
-void SolidBones::set_look(int bone, const std::array<std::uint8_t, 3>& colour, double opacity) {
-  impl_->looks[bone] = {colour, opacity};
+void SolidBones::set_paint(int bone, const std::array<std::uint8_t, 3>& colour, double opacity) {
+  impl_->paints[bone] = {colour, opacity};
   impl_->apply(bone);
 }
 

@@ -28,8 +28,8 @@ class SolidBones {
   void clear();
   // Bone frame. Takes the place of the bone's surface.
   void show(int bone, const Mesh& mesh);
-  // `opacity`: from 0, which nobody sees or hits, to 1. A bone without a look is white. It stays after clear().
-  void set_look(int bone, const std::array<std::uint8_t, 3>& colour, double opacity);
+  // `opacity`: from 0, which nobody sees or hits, to 1. A bone without one is white. It stays after clear().
+  void set_paint(int bone, const std::array<std::uint8_t, 3>& colour, double opacity);
 
   // The first one at a pixel. Columns from the left, rows from the bottom.
   [[nodiscard]] std::optional<SolidHit> at(int x_px, int y_px) const;
