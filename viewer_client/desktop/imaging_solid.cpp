@@ -19,7 +19,7 @@ namespace {
 constexpr int kEditPause_ms = 150;  // a drag is many edits
 constexpr int kFrame_px = 1;        // for the frame of the keyboard's focus
 constexpr QColor kFocusFrame{250, 220, 120};
-constexpr double kMarkShare = 0.014;  // radius of a mark, of the diagonal of what is seen
+constexpr double kMarkShare = 0.018;  // radius of a mark, of the diagonal of what is seen
 
 VoxelGrid grid_of(const ScanGeometry& scan) { return {scan.dims, scan.origin_mm, scan.axes_mm}; }
 

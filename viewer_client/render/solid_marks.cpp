@@ -1,6 +1,7 @@
 #include "viewer_client/render/solid_marks.hpp"
 
 #include <vtkActor.h>
+#include <vtkAppendPolyData.h>
 #include <vtkConeSource.h>
 #include <vtkCubeSource.h>
 #include <vtkGlyph3D.h>
@@ -22,7 +23,8 @@ namespace {
 // Red, green, blue. As on the planes.
 constexpr std::array<std::array<double, 3>, 3> kMarkColours{
     {{0.98, 0.86, 0.47}, {0.98, 0.86, 0.47}, {1.0, 0.24, 0.24}}};
-constexpr double kCubeEdge = 0.9, kPyramidHeight = 2.6, kPyramidRadius = 1.6;  // in radii of a ball
+// In radii of a ball.
+constexpr double kBarLength = 2.8, kBarWidth = 0.5, kPyramidHeight = 2.6, kPyramidRadius = 1.6;
 constexpr int kBallSides = 12, kPyramidSides = 3;
 constexpr double kMarkAmbient = 0.65;  // light from everywhere, so that no side is black
 
@@ -41,16 +43,20 @@ struct SolidMarks::Impl {
     ball->SetRadius(1.0);
     ball->SetThetaResolution(kBallSides);
     ball->SetPhiResolution(kBallSides);
-    vtkNew<vtkCubeSource> cube;
-    cube->SetXLength(kCubeEdge);
-    cube->SetYLength(kCubeEdge);
-    cube->SetZLength(kCubeEdge);
+    vtkNew<vtkAppendPolyData> star;
+    for (int axis = 0; axis < 3; ++axis) {
+      vtkNew<vtkCubeSource> bar;
+      bar->SetXLength(axis == 0 ? kBarLength : kBarWidth);
+      bar->SetYLength(axis == 1 ? kBarLength : kBarWidth);
+      bar->SetZLength(axis == 2 ? kBarLength : kBarWidth);
+      star->AddInputConnection(bar->GetOutputPort());
+    }
     vtkNew<vtkConeSource> pyramid;
     pyramid->SetDirection(0.0, 0.0, 1.0);
     pyramid->SetHeight(kPyramidHeight);
     pyramid->SetRadius(kPyramidRadius);
     pyramid->SetResolution(kPyramidSides);
-    const std::array<vtkAlgorithmOutput*, 3> forms{ball->GetOutputPort(), cube->GetOutputPort(),
+    const std::array<vtkAlgorithmOutput*, 3> forms{ball->GetOutputPort(), star->GetOutputPort(),
                                                    pyramid->GetOutputPort()};
     for (std::size_t i = 0; i < kinds.size(); ++i) {
       Kind& kind = kinds[i];

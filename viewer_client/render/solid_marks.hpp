@@ -11,7 +11,7 @@ namespace osteon {
 
 class LayerAbove;
 
-// Seed: a ball. Scribble: a small cube. Outside: a pyramid with three sides, which points to the head.
+// Seed: a ball. Scribble: a star of three bars. Outside: a pyramid with three sides, which points to the head.
 enum class SolidMark : std::uint8_t { seed, scribble, outside };
 
 class SolidMarks {
