@@ -24,7 +24,7 @@ namespace {
 constexpr std::array<std::array<double, 3>, 3> kMarkColours{
     {{0.98, 0.86, 0.47}, {0.98, 0.86, 0.47}, {1.0, 0.24, 0.24}}};
 // In radii of a ball.
-constexpr double kBarLength = 2.8, kBarWidth = 0.5, kPyramidHeight = 2.6, kPyramidRadius = 1.6;
+constexpr double kBarLength = 3.2, kBarWidth = 0.4, kPyramidHeight = 2.6, kPyramidRadius = 1.6;
 constexpr int kBallSides = 12, kPyramidSides = 3;
 constexpr double kMarkAmbient = 0.65;  // light from everywhere, so that no side is black
 
