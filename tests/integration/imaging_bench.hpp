@@ -1,6 +1,8 @@
 // The page of image processing on the bench of a window, with a scan of two balls.
 #pragma once
+#include <QListWidget>
 #include <QSettings>
+#include <QSlider>
 #include <array>
 #include <cmath>
 #include <filesystem>
@@ -30,11 +32,16 @@ class ImagingBench : public WindowBench {
     }
     return folder;
   }
-  template <class Widget>
-  [[nodiscard]] Widget& part(const char* name) const {
-    auto* found = window_->findChild<Widget*>(name);
-    if (found == nullptr) ADD_FAILURE() << name;
-    return *found;
+  [[nodiscard]] QListWidget& islands() const { return part<QListWidget>("islands"); }
+  // Opens the two balls, and waits for their parts. The axial plane goes through both.
+  void open_two_balls() {
+    window_->process_images(QString::fromStdString(series("balls", two_balls()).string()));
+    auto& list = part<QListWidget>("series");
+    ASSERT_TRUE(until([&] { return list.isVisible() && list.count() == 1; })) << words();
+    QTest::mouseClick(list.viewport(), Qt::LeftButton, {}, list.visualItemRect(list.item(0)).center());
+    ASSERT_TRUE(until([&] { return islands().isVisible() && islands().isEnabled() && islands().count() == 2; }))
+        << words();
+    part<QSlider>("slice_axial").setValue(12);
   }
   [[nodiscard]] ImagingPlane& plane(const char* name) const {
     auto* found = dynamic_cast<ImagingPlane*>(window_->findChild<QWidget*>(name));

@@ -3,13 +3,18 @@
 #include <gtest/gtest.h>
 
 #include <QCheckBox>
+#include <QColor>
+#include <QComboBox>
 #include <QLabel>
 #include <QListWidget>
 #include <QPushButton>
 #include <QScrollArea>
 #include <QSlider>
+#include <QSpinBox>
 #include <QTest>
+#include <QToolButton>
 #include <QWheelEvent>
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <memory>
@@ -27,15 +32,8 @@ class ImagingSolidTest : public test::ImagingBench {
  protected:
   void SetUp() override {
     ImagingBench::SetUp();
-    window_->process_images(QString::fromStdString(series("solid", two_balls()).string()));
-    auto& list = part<QListWidget>("series");
-    ASSERT_TRUE(until([&] { return list.isVisible() && list.count() == 1; })) << words();
-    QTest::mouseClick(list.viewport(), Qt::LeftButton, {}, list.visualItemRect(list.item(0)).center());
-    ASSERT_TRUE(until([&] { return islands().isVisible() && islands().isEnabled() && islands().count() == 2; }))
-        << words();
-    part<QSlider>("slice_axial").setValue(12);
+    open_two_balls();
   }
-  [[nodiscard]] QListWidget& islands() const { return part<QListWidget>("islands"); }
   [[nodiscard]] ImagingSolid& solid() const {
     auto* found = dynamic_cast<ImagingSolid*>(window_->findChild<QWidget*>("solid"));
     EXPECT_NE(found, nullptr);
@@ -68,16 +66,33 @@ class ImagingSolidTest : public test::ImagingBench {
         if (x >= 0 && y >= 0 && x < image.width_px && y < image.height_px && has(image.at(x, y))) ++count;
     return static_cast<double>(count) / all;
   }
-  // Ivory, in light or in shadow. The background is blue, and the crosshair is green.
-  [[nodiscard]] bool shows_bone(const Vec3& point_mm) const {
-    return share(point_mm, [](const auto& c) { return c[0] > 90 && c[0] > c[1] && c[1] > c[2] + 8; }) > 0.6;
+  // Of a ball's tint on the axial plane, beside its seed. A grey voxel changes no hue.
+  [[nodiscard]] int plane_hue(int side) const {
+    ImagingPlane& axial = plane("plane_axial");
+    const auto [x, y, z] = ball(side);
+    return QColor(axial.grab().toImage().pixel(axial.pixel({x + 4, y + 3, z}))).hsvHue();
+  }
+  // A surface of this hue, in light or in shadow. The background has none.
+  [[nodiscard]] bool shows_hue(const Vec3& point_mm, int hue) const {
+    const auto near = [&](const auto& c) {
+      const QColor seen(c[0], c[1], c[2]);
+      const int apart = std::abs(seen.hsvHue() - hue);
+      return seen.value() > 70 && std::min(apart, 360 - apart) <= 12;
+    };
+    return share(point_mm, near) > 0.6;
+  }
+  // Up and aside, away from the seed and the crosshair.
+  [[nodiscard]] static Vec3 beside(const Vec3& point_mm) { return point_mm + Vec3(3.5, 0, 3.5); }
+  [[nodiscard]] bool shows_bone(int side) const { return shows_hue(beside(middle_of(side)), plane_hue(side)); }
+  [[nodiscard]] bool shows_bone_between() const {
+    return shows_hue(middle_of(0), plane_hue(1)) || shows_hue(middle_of(0), plane_hue(-1));
   }
   [[nodiscard]] bool shows_muscle(const Vec3& point_mm) const {
     return share(point_mm, [](const auto& c) { return c[0] > c[1] + 15 && c[0] > c[2] + 15; }) > 0.6;
   }
   [[nodiscard]] bool shows(bool left, bool right) const {
-    return view().frames() > 0 && view().isVisible() && solid().current() && shows_bone(middle_of(1)) == left &&
-           shows_bone(middle_of(-1)) == right;
+    return view().frames() > 0 && view().isVisible() && solid().current() && shows_bone(1) == left &&
+           shows_bone(-1) == right;
   }
   void drag(const QPoint& by) const {
     const QPoint begin = view().rect().center();
@@ -119,7 +134,7 @@ TEST_F(ImagingSolidTest, WhatIsKeptIsSeenAndChoosesTheCrosshair) {
   keep(-1);
   ASSERT_TRUE(until([&] { return shows(true, true); })) << words();
   keep_picture("solid_both");
-  EXPECT_FALSE(shows_bone(middle_of(0)));
+  EXPECT_FALSE(shows_bone_between());
 
   // Space takes the tick of the part away.
   islands().setFocus();
@@ -192,6 +207,98 @@ TEST_F(ImagingSolidTest, SoftTissueIsCoarseWhileTheViewMoves) {
   keep_picture("solid_small");
 }
 
+TEST_F(ImagingSolidTest, ABoneHasTheTintOfThePlanesAndChoosesItsRow) {
+  keep(1);
+  keep(-1);
+  ASSERT_TRUE(until([&] { return shows(true, true); })) << words();
+  EXPECT_GT(std::abs(plane_hue(1) - plane_hue(-1)), 30);
+  // The row whose square has the colour of the ball that was clicked.
+  const auto row_hue = [&] {
+    const QListWidgetItem* row = islands().currentItem();
+    return row == nullptr ? -1 : QColor(row->icon().pixmap(12, 12).toImage().pixel(6, 6)).hsvHue();
+  };
+  for (const int side : {1, -1, 1}) {
+    const Vec3 crosshair = crosshair_mm();
+    QTest::mouseClick(&view(), Qt::LeftButton, {}, pixel(beside(middle_of(side))));
+    EXPECT_NEAR(row_hue(), plane_hue(side), 5) << words();
+    EXPECT_EQ(crosshair_mm(), crosshair) << "a click moves it";
+  }
+  QTest::mouseClick(&view(), Qt::LeftButton, {}, QPoint(3, 3));
+  EXPECT_NEAR(row_hue(), plane_hue(1), 5) << "there is no bone";
+
+  // The bone of the ball on the patient's left fades in both pictures, and who does not see it cannot click it.
+  auto& choice = part<QComboBox>("bone_choice");
+  choice.setCurrentIndex(1);
+  const auto lightness = [&] {
+    const QPoint at = pixel(beside(middle_of(1)));
+    const auto c = view().scene().image().at(at.x(), at.y());
+    return c[0] + c[1] + c[2];
+  };
+  const int opaque = lightness(), right_hue = plane_hue(-1);
+  part<QSpinBox>("bone_opacity").setValue(50);
+  ASSERT_TRUE(until([&] { return lightness() < opaque - 30; })) << opaque;
+  const int half = lightness();
+  keep_picture("solid_faded");
+  part<QSpinBox>("bone_opacity").setValue(0);
+  ASSERT_TRUE(until([&] { return lightness() < half - 30; })) << half;
+  EXPECT_TRUE(shows_hue(beside(middle_of(-1)), right_hue));
+  islands().setCurrentRow(-1);
+  QTest::mouseClick(&view(), Qt::LeftButton, {}, pixel(beside(middle_of(1))));
+  EXPECT_EQ(islands().currentItem(), nullptr);
+}
+
+// The shape of each mark, as the part of the rectangle round it that it fills: a ball fills pi / 4, a triangle the
+// half, and thin bars that cross leave half of it free at least.
+TEST_F(ImagingSolidTest, MarksDifferInTheirShapes) {
+  keep(1);
+  ImagingPlane& axial = plane("plane_axial");
+  const auto click = [&](const char* tool, const std::array<int, 3>& voxel) {
+    QTest::mouseClick(&part<QToolButton>(tool), Qt::LeftButton);
+    QTest::mouseClick(&axial, Qt::LeftButton, {}, axial.pixel(voxel));
+  };
+  const std::array<int, 3> seed = ball(1), outside{seed[0] + 5, seed[1], seed[2]}, painted{29, 29, seed[2]};
+  click("tool_outside", outside);
+  click("tool_paint", painted);
+  part<QSlider>("slice_axial").setValue(3);  // the crosshair leaves the marks
+  part<QSlider>("slice_sagittal").setValue(3);
+  struct Seen {
+    int pixels = 0, left = 1 << 20, right = -1, top = 1 << 20, bottom = -1;
+    [[nodiscard]] double fill() const {
+      return pixels == 0 ? 0.0 : static_cast<double>(pixels) / ((right - left + 1) * (bottom - top + 1));
+    }
+  };
+  const auto seen_at = [&](const std::array<int, 3>& voxel, bool red) {
+    constexpr int kAbout_px = 16;
+    const Image image = view().scene().image();
+    const QPoint at = pixel(two_balls().position_mm(Vec3(voxel[0], voxel[1], voxel[2])));
+    Seen seen;
+    for (int y = std::max(0, at.y() - kAbout_px); y <= std::min(image.height_px - 1, at.y() + kAbout_px); ++y)
+      for (int x = std::max(0, at.x() - kAbout_px); x <= std::min(image.width_px - 1, at.x() + kAbout_px); ++x) {
+        const auto c = image.at(x, y);
+        const bool is_red = c[0] > 110 && c[1] < 0.36 * c[0] && c[2] < 0.36 * c[0];
+        const bool is_yellow = c[0] > 110 && c[1] > 0.75 * c[0] && c[2] < 0.62 * c[0];
+        if (red ? !is_red : !is_yellow) continue;
+        ++seen.pixels;
+        seen.left = std::min(seen.left, x), seen.right = std::max(seen.right, x);
+        seen.top = std::min(seen.top, y), seen.bottom = std::max(seen.bottom, y);
+      }
+    return seen;
+  };
+  ASSERT_TRUE(until([&] {
+    return solid().current() && seen_at(seed, false).pixels > 20 && seen_at(outside, true).pixels > 20 &&
+           seen_at(painted, false).pixels > 8;
+  })) << seen_at(seed, false).pixels
+      << " " << seen_at(outside, true).pixels << " " << seen_at(painted, false).pixels;
+  keep_picture("solid_marks");
+  EXPECT_NEAR(seen_at(seed, false).fill(), 0.785, 0.1);
+  EXPECT_NEAR(seen_at(outside, true).fill(), 0.5, 0.12);
+  EXPECT_LT(seen_at(painted, false).fill(), 0.55);
+  // Undo takes the mark away.
+  QTest::keySequence(window_.get(), QKeySequence::Undo);
+  EXPECT_TRUE(until([&] { return seen_at(painted, false).pixels == 0; }));
+  EXPECT_GT(seen_at(outside, true).pixels, 20);
+}
+
 // The picture without a window round it: what the page does between two events cannot be timed there.
 class ImagingSolidTestAlone : public test::WindowBench {
  protected:
@@ -211,7 +318,10 @@ class ImagingSolidTestAlone : public test::WindowBench {
       for (int i = 160; i <= 180; ++i) numbers.values[numbers.index({i, 10, k})] = 2;
     scene_.islands = *IslandMap::make(geometry, std::move(numbers));
     scene_.look.kept[1].set(1);
-    solid_ = std::make_unique<ImagingSolid>(scene_, [this](const std::array<int, 3>& voxel) { chosen_ = voxel; });
+    set_tints(scene_.look, {});
+    solid_ = std::make_unique<ImagingSolid>(
+        scene_, ImagingSolid::Events{[this](const std::array<int, 3>& voxel) { chosen_ = voxel; },
+                                     [](int, const std::array<int, 3>&) {}});
     solid_->resize(400, 340);
     solid_->show();
     solid_->begin();

@@ -43,7 +43,6 @@ using test::two_balls;
 
 class ImagingTest : public test::ImagingBench {
  protected:
-  [[nodiscard]] QListWidget& islands() const { return part<QListWidget>("islands"); }
   [[nodiscard]] bool idle() const { return !part<QPushButton>("imaging_cancel").isVisible(); }
   [[nodiscard]] bool found(int count) const { return idle() && islands().isVisible() && islands().count() == count; }
   void click(const char* button) {
@@ -325,6 +324,7 @@ TEST_F(ImagingTest, WhatIsNoCtIsRefusedWithOneSentence) {
   choose_series(list);
   ASSERT_TRUE(until([&] { return idle() && islands().isVisible(); })) << words();
   EXPECT_NE(refused().find("threshold"), std::string::npos) << words();
+  EXPECT_EQ(words().find("--"), std::string::npos) << "no option of a command: " << words();
   EXPECT_FALSE(part<QPushButton>("make_bone").isEnabled());
   // A good one afterwards.
   open_scan(series("ct", two_balls()), 2);

@@ -35,9 +35,12 @@
 #include <vector>
 
 #include "common/phantoms/phantom_bone.hpp"
+#include "common/wire/credentials.hpp"
 #include "tests/integration/desk.hpp"
 #include "tests/support/wait.hpp"
 #include "viewer_client/desktop/bone_view.hpp"
+#include "viewer_client/desktop/field_sentences.hpp"
+#include "viewer_client/desktop/landmark_names.hpp"
 #include "viewer_client/desktop/language.hpp"
 #include "viewer_client/desktop/library.hpp"
 #include "viewer_client/desktop/main_window.hpp"
@@ -374,6 +377,46 @@ TEST_F(LanguageTest, NamesOfPhantomsAreTranslated) {
   EXPECT_EQ(structure_title("my own structure"), "my own structure");
   speak("en");
   EXPECT_EQ(structure_title("femur, mechanical axis"), "femur, mechanical axis");
+}
+
+// A case has the same names in each language, so it has the same hash.
+TEST_F(LanguageTest, StandardLandmarksAreSeenInGermanAndStoredInEnglish) {
+  const QStringList english = suggested_landmarks();
+  EXPECT_EQ(english[1], "Greater trochanter");
+  speak("de");
+  const QStringList german = suggested_landmarks();
+  ASSERT_EQ(german.size(), english.size());
+  for (int i = 0; i < german.size(); ++i) {
+    EXPECT_NE(german[i], english[i]);
+    EXPECT_EQ(landmark_name(german[i] + " "), english[i].toStdString());
+    EXPECT_EQ(landmark_title(english[i].toStdString()), german[i]);
+  }
+  EXPECT_EQ(german[1], "Großer Rollhügel");
+  EXPECT_EQ(landmark_name("Meine Marke"), "Meine Marke");
+  EXPECT_EQ(landmark_title("Meine Marke"), "Meine Marke");
+  speak("en");
+}
+
+TEST_F(LanguageTest, SentencesNameFieldsAndNoOptions) {
+  EXPECT_EQ(with_fields("nothing listens at x:1; give with --server the address that it printed"),
+            "nothing listens at x:1; give in the field “Server, HOST:PORT” the address that it printed");
+  EXPECT_EQ(with_fields("there is none; choose a lower --threshold or a smaller --pitch"),
+            "there is none; choose a lower value in the field “Threshold”");
+  // Of whoever runs the server.
+  EXPECT_EQ(with_fields("this server takes no cases; start it with --uploads FOLDER"),
+            "this server takes no cases; start it with --uploads FOLDER");
+  // One credential alone, and plain text to another machine.
+  const auto half = wire::client_credentials({.plain = false, .certificates = "/nowhere", .ticket = ""});
+  ASSERT_FALSE(half);
+  const auto far = wire::channel_credentials({}, "192.0.2.1:1");
+  ASSERT_FALSE(far);
+  speak("de");
+  for (const Error& error : {half.error(), far.error()}) {
+    const QString shown = sentence_of(error);
+    EXPECT_FALSE(shown.contains("--")) << shown.toStdString();
+    EXPECT_TRUE(shown.contains("“Datei Ihres Tickets”")) << shown.toStdString();
+  }
+  speak("en");
 }
 
 TEST_F(LanguageTest, ShortCutsAreTheSameInBothLanguages) {

@@ -3,7 +3,6 @@
 
 #include <QDialog>
 #include <QLabel>
-#include <QLineEdit>
 #include <QPushButton>
 #include <QSettings>
 #include <QStatusBar>
@@ -14,15 +13,12 @@
 #include <fstream>
 #include <memory>
 #include <nlohmann/json.hpp>
-#include <optional>
 #include <string>
-#include <vector>
 
 #include "common/volume/case.hpp"
-#include "tests/integration/window_bench.hpp"
+#include "tests/integration/sending_bench.hpp"
 #include "tests/support/content.hpp"
 #include "tests/support/process.hpp"
-#include "tests/support/temp_dir.hpp"
 #include "viewer_client/desktop/language.hpp"
 #include "viewer_client/desktop/library.hpp"
 
@@ -32,53 +28,20 @@ namespace {
 using namespace std::chrono_literals;
 namespace fs = std::filesystem;
 
-class SendingTest : public test::WindowBench {
+class SendingTest : public test::SendingBench<test::WindowBench> {
  protected:
   void SetUp() override {
     QSettings().setValue("tour/seen", true);
     speak("en");
-    WindowBench::SetUp();
+    SendingBench::SetUp();
     if (!fs::exists(sent())) {
       const auto made = test::run(test::program("osteon-import"), {"phantom", "block", "--layers", "6:1.2", "--width",
                                                                    "10", "--pitch", "0.5", "--out", sent()});
       ASSERT_EQ(made.exit_code, 0) << made.err;
     }
-    start_server({"--uploads", uploads_.path(), "--rooms", rooms_.path()});
   }
-  void TearDown() override {
-    server_.reset();
-    WindowBench::TearDown();
-  }
-
   // The case that is sent. The server has another one.
   [[nodiscard]] static fs::path sent() { return desk_->temp() / "sent"; }
-  void start_server(std::vector<std::string> more) {
-    const fs::path address = desk_->temp() / "address";
-    fs::remove(address);
-    more.insert(more.end(), {"--plain", "--case", desk_->bone(), "--address-file", address});
-    server_.emplace(test::program("osteon-server"), more);
-    address_ = test::wait_for_address(address, 60s).value_or("");
-    ASSERT_FALSE(address_.empty()) << server_->err();
-  }
-  [[nodiscard]] std::string listed(const std::string& what) const {
-    return test::run(test::program("osteon-server"), {what, "list", "--plain", "--server", address_}).out;
-  }
-  template <class Widget>
-  [[nodiscard]] Widget& part(const char* name) const {
-    auto* found = window_->findChild<Widget*>(name);
-    if (found == nullptr) ADD_FAILURE() << name;
-    return *found;
-  }
-  [[nodiscard]] std::string words() const { return label("send_words").toStdString(); }
-  // Fills the open dialog and presses its button.
-  void send(const std::string& address, const char* room = "") {
-    part<QLineEdit>("address").setText(QString::fromStdString(address));
-    part<QLineEdit>("new_room").setText(room);
-    part<QLineEdit>("certificates").clear();
-    part<QLineEdit>("ticket").clear();
-    QTest::mouseClick(&part<QPushButton>("send_case"), Qt::LeftButton);
-  }
-  [[nodiscard]] bool at_rest() const { return part<QPushButton>("send_case").isEnabled(); }
   [[nodiscard]] bool half_sent() const { return words() == "The case is being sent" && !fs::is_empty(uploads_.path()); }
   // No case, but as much data as takes a while.
   [[nodiscard]] static fs::path large_file() {
@@ -89,9 +52,6 @@ class SendingTest : public test::WindowBench {
   }
 
   static constexpr std::uintmax_t kLargeBytes = std::uintmax_t{1} << 30;
-  test::TempDir uploads_, rooms_;
-  std::optional<test::Process> server_;
-  std::string address_;
 };
 
 TEST_F(SendingTest, TheServerGetsTheSameCaseAndOpensARoomWithIt) {
@@ -205,6 +165,7 @@ TEST_F(SendingTest, ARefusalSaysWhyAndSendingGoesOn) {
   };
   window_->send_case(nothing);
   refused("nowhere", "is not HOST:PORT");
+  EXPECT_EQ(words().find("--"), std::string::npos) << words();
   refused(address_, "zip archive");
   // A folder that is no case is refused before anything is sent.
   fs::create_directories(desk_->temp() / "empty");

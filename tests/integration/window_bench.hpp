@@ -44,6 +44,12 @@ class WindowBench : public testing::Test {
     }
     return true;
   }
+  template <class Widget>
+  [[nodiscard]] Widget& part(const char* name) const {
+    auto* found = window_->findChild<Widget*>(name);
+    if (found == nullptr) ADD_FAILURE() << name;
+    return *found;
+  }
   [[nodiscard]] QString label(const char* name) const;  // empty without such a label
   // Opens the block and looks at its upper side, z = 0, from above.
   void open(const std::filesystem::path& session = {});

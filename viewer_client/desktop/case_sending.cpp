@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "common/wire/room_client.hpp"
+#include "viewer_client/desktop/field_sentences.hpp"
 #include "viewer_client/desktop/library.hpp"
 
 namespace osteon {
@@ -14,7 +15,6 @@ namespace {
 constexpr auto kReachPatience = std::chrono::seconds(10);  // for the connection
 constexpr const char* kArchive = "case.osteon";
 
-QString words_of(const Error& error) { return QString::fromStdString(error.message); }
 }  // namespace
 
 // StaleFiles knows a folder of this name as that of a program that was killed.
@@ -39,9 +39,7 @@ void CaseSending::cancel() {
   if (packer_) packer_->cancel();
 }
 
-void CaseSending::fail(const QString& sentence) {
-  events_.failed(cancelled_ ? tr("Cancelled. The server stored nothing, and the case here stays.") : sentence);
-}
+void CaseSending::fail(const QString& sentence) { events_.failed(cancelled_ ? QString() : sentence); }
 
 // Only the user may read the file: it has a patient's scan.
 void CaseSending::pack() {
@@ -96,7 +94,7 @@ KeepGoing CaseSending::keep_going() {
 
 void CaseSending::work(const std::filesystem::path& archive) {
   const auto failed = [this](const Error& error) {
-    in_gui([this, why = words_of(error), has_all = shown_ == Stage::checking] {
+    in_gui([this, why = sentence_of(error), has_all = shown_ == Stage::checking] {
       cancelled_&& has_all ? events_.failed(tr("Cancelled. A server that had already checked the case may have it."))
                            : fail(why);
     });
@@ -123,7 +121,7 @@ void CaseSending::open_room(const std::shared_ptr<grpc::Channel>& channel, const
     return in_gui([this] {
       events_.sent(tr("%1 has the case, and the room %2 is open with it.").arg(to_.address, to_.room), to_.room);
     });
-  in_gui([this, why = words_of(opened.error())] {
+  in_gui([this, why = sentence_of(opened.error())] {
     events_.failed(cancelled_ ? tr("Cancelled. %1 has the case, and the room may be open.").arg(to_.address)
                               : tr("%1 has the case, but did not open the room: %2").arg(to_.address, why));
   });

@@ -28,7 +28,7 @@ class CaseSending : public QObject {
     std::function<void(int percent)> progress;  // of packing and sending
     // One sentence. `room`: the room that is open with the case; empty: none.
     std::function<void(const QString& sentence, const QString& room)> sent;
-    std::function<void(const QString& sentence)> failed;
+    std::function<void(const QString& sentence)> failed;  // empty: cancelled, and the server stored nothing
   };
   // `what`: the folder of a case, or a file with one. `to.room`: the room to open; empty: none.
   CaseSending(std::filesystem::path what, RoomAddress to, Events events);

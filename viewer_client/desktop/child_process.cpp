@@ -10,6 +10,8 @@
 #include <csignal>
 #include <utility>
 
+#include "viewer_client/desktop/field_sentences.hpp"
+
 namespace osteon {
 
 namespace {
@@ -40,7 +42,7 @@ void ChildProcess::end(std::chrono::milliseconds patience) {
 
 QString ChildProcess::last_sentence() const {
   const QString said = last_line();
-  if (!said.isEmpty()) return said;
+  if (!said.isEmpty()) return with_fields(said);
   const QString folder = QFileInfo(log_file_).absolutePath();
   const QStorageInfo disk(folder);
   // Some file systems tell no size.

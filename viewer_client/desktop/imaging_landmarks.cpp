@@ -13,6 +13,7 @@
 #include <utility>
 
 #include "viewer_client/desktop/enabled.hpp"
+#include "viewer_client/desktop/landmark_names.hpp"
 
 namespace osteon {
 
@@ -30,9 +31,7 @@ ImagingLandmarks::ImagingLandmarks(Events events, QWidget* parent) : QWidget(par
   name_->setToolTip(tr("Name of the landmark that the next click with Landmark sets. One that is there moves."));
   name_->setEditable(true);
   name_->setInsertPolicy(QComboBox::NoInsert);
-  name_->addItems({tr("Centre of the femoral head"), tr("Greater trochanter"), tr("Medial epicondyle"),
-                   tr("Lateral epicondyle"), tr("Tibial tuberosity"), tr("Medial malleolus"), tr("Lateral malleolus"),
-                   tr("Anterior superior iliac spine"), tr("Pubic tubercle")});
+  name_->addItems(suggested_landmarks());
   // The page is narrow. A long name scrolls.
   name_->setSizeAdjustPolicy(QComboBox::AdjustToMinimumContentsLengthWithIcon);
   name_->clearEditText();
@@ -54,8 +53,7 @@ ImagingLandmarks::ImagingLandmarks(Events events, QWidget* parent) : QWidget(par
     if (filling_) return;
     const std::string before = item->data(kLandmarkName).toString().toStdString();
     // Later, since the list is filled anew, and its editor is still at work.
-    QTimer::singleShot(0, this,
-                       [this, before, other = item->text().trimmed().toStdString()] { events_.rename(before, other); });
+    QTimer::singleShot(0, this, [this, before, other = landmark_name(item->text())] { events_.rename(before, other); });
   });
   remove_ = new QPushButton(tr("Remove"));
   remove_->setObjectName("landmark_remove");
@@ -77,7 +75,7 @@ ImagingLandmarks::ImagingLandmarks(Events events, QWidget* parent) : QWidget(par
   follow({});
 }
 
-std::string ImagingLandmarks::name() const { return name_->currentText().trimmed().toStdString(); }
+std::string ImagingLandmarks::name() const { return landmark_name(name_->currentText()); }
 
 void ImagingLandmarks::show_item(const QListWidgetItem* item) {
   name_->setEditText(item->text());
@@ -90,13 +88,13 @@ void ImagingLandmarks::follow(const ImagingEdits& edits) {
   const QString before = chosen != nullptr ? chosen->data(kLandmarkName).toString() : QString();
   list_->clear();
   for (const MarkedLandmark& landmark : edits.landmarks) {
-    const QString text = QString::fromStdString(landmark.name);
-    auto* item = new QListWidgetItem(text, list_);
-    item->setData(kLandmarkName, text);
+    const QString name = QString::fromStdString(landmark.name);
+    auto* item = new QListWidgetItem(landmark_title(landmark.name), list_);
+    item->setData(kLandmarkName, name);
     item->setFlags(item->flags() | Qt::ItemIsEditable);
     const auto mm = [](double value) { return QLocale().toString(value, 'f', 1); };
     item->setToolTip(tr("%1, %2, %3 mm").arg(mm(landmark.at_mm.x()), mm(landmark.at_mm.y()), mm(landmark.at_mm.z())));
-    if (text == before) list_->setCurrentItem(item);
+    if (name == before) list_->setCurrentItem(item);
   }
   filling_ = false;
   set_enabled(*remove_, list_->currentItem() != nullptr, tr("Choose a landmark in the list first."));

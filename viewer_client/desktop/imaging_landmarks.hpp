@@ -27,7 +27,7 @@ class ImagingLandmarks : public QWidget {
 
   // The landmarks that there are.
   void follow(const ImagingEdits& edits);
-  // Of the next click: a landmark that is there moves.
+  // Of the next click, as the case has it: a landmark that is there moves.
   [[nodiscard]] std::string name() const;
 
  private:

@@ -95,14 +95,10 @@ ImagingSteps::Events ImagingPage::step_events() {
           [this](ShownScan scan, const HuHistogram& histogram) { show_filtered(std::move(scan), histogram); },
           [this](std::vector<ListedIsland> list, IslandMap map) { show_islands(std::move(list), std::move(map)); },
           [this](VoxelFile<std::uint8_t> edges) { show_edges(std::move(edges)); },
-          [this](const std::filesystem::path& bone) {
-            events_.busy(false);
-            const QString said = show_report(bone);
-            end_work(said);
-            events_.made(bone, said);
-          },
+          [this](const std::filesystem::path& bone) { use_made(bone); },
           [this](const QString& sentence) {
             events_.busy(false);
+            sends_made_ = false;
             if (scene_.look.edges.values.empty()) show_edges({});
             if (scene_.waits()) forget_first();
             end_work(sentence.isEmpty() ? tr("Cancelled. Nothing was written.") : sentence);
@@ -166,7 +162,8 @@ QBoxLayout* ImagingPage::make_planes() {
          [this](int notches) { tools_->turn_radius(notches); }});
     grid->addWidget(planes_[i], static_cast<int>(i) / 2, static_cast<int>(i) % 2);
   }
-  solid_ = new ImagingSolid(scene_, [this](const std::array<int, 3>& voxel) { look_at(voxel); });
+  solid_ = new ImagingSolid(scene_, {[this](const std::array<int, 3>& voxel) { look_at(voxel); },
+                                     [this](int bone, const std::array<int, 3>& voxel) { choose_part(bone, voxel); }});
   grid->addWidget(solid_, 1, 1);
   for (int at = 0; at < 2; ++at) grid->setRowStretch(at, 1), grid->setColumnStretch(at, 1);
   all->addLayout(grid, 1);
@@ -268,6 +265,11 @@ QBoxLayout* ImagingPage::make_side() {
   column->addWidget(report_);
   make_ = add_button(*column, tr("&Make the bone"), "make_bone",
                      tr("Makes a case of the kept bones, and opens it to practise"), [this] { make_bone(); });
+  send_ =
+      add_button(*column, tr("Send to a server…"), "send_bone",
+                 tr("Makes a case of the kept bones, and opens the dialog that sends it"), [this] { make_and_send(); });
+  send_->setShortcut(QKeySequence("Ctrl+Alt+U"));
+  send_->setToolTip(QString("%1 (%2)").arg(send_->toolTip(), send_->shortcut().toString(QKeySequence::NativeText)));
   return column;
 }
 
@@ -458,6 +460,14 @@ void ImagingPage::point_at(const std::array<int, 3>& voxel) {
   readout_->setText(text);
 }
 
+void ImagingPage::choose_part(int bone, const std::array<int, 3>& voxel) {
+  const int island = island_near(scene_.scan.geometry, scene_.islands, scene_.look.kept, bone, voxel);
+  const auto part = std::ranges::find(islands_, island, &ListedIsland::number);
+  if (part == islands_.end()) return words_->setText(tr("This bone is painted, so no part of the list is its own."));
+  island_list_->setCurrentRow(static_cast<int>(part - islands_.begin()));
+  words_->setText(tr("Part %1 is chosen in the list.").arg(island));
+}
+
 void ImagingPage::change_window(const HuWindow& window) {
   scene_.look.window = window;
   scene_.greys = GreyTable(window);
@@ -526,8 +536,9 @@ void ImagingPage::enable_parts() {
     const auto voxel = scene_.open() ? voxel_of(scene_.scan.geometry, seed.at_mm) : std::nullopt;
     return voxel && seed.bone != 0 && scene_.islands.number(*voxel) != 0;
   });
-  set_enabled(*make_, found && some,
-              found ? tr("Keep a bone first: tick it in the list, or double-click it with Crosshair.") : none);
+  for (QPushButton* makes : {make_, send_})
+    set_enabled(*makes, found && some,
+                found ? tr("Keep a bone first: tick it in the list, or double-click it with Crosshair.") : none);
 }
 
 }  // namespace osteon

@@ -43,6 +43,8 @@ class ImagingPage : public QWidget {
     std::function<void(bool busy)> busy;  // a case is being made
     // `said`: where the report is, if there is one.
     std::function<void(const std::filesystem::path& bone, const QString& said)> made;
+    std::function<bool()> may_send;                               // now; if not, it has told why
+    std::function<void(const std::filesystem::path& bone)> send;  // it was made for that
     std::function<void()> leave;
   };
   explicit ImagingPage(Events events, QWidget* parent = nullptr);
@@ -84,9 +86,13 @@ class ImagingPage : public QWidget {
   void find_islands();
   void show_largest_bone();
   void make_bone();
+  void make_and_send();
+  void use_made(const std::filesystem::path& bone);
 
   void look_at(const std::array<int, 3>& voxel);
   void point_at(const std::array<int, 3>& voxel);
+  // The row of a bone's part, at a voxel of its surface.
+  void choose_part(int bone, const std::array<int, 3>& voxel);
   void change_window(const HuWindow& window);
   void preview_threshold(int hu);
   // Into the history.
@@ -160,6 +166,7 @@ class ImagingPage : public QWidget {
   ImagingSteps steps_;
   QString wanted_source_;       // to open when the step at work has ended
   bool wants_islands_ = false;  // the same
+  bool sends_made_ = false;     // the case that is being made
   bool filling_ = false;        // the list changes by itself
   std::vector<ListedSeries> series_;
   QStackedWidget* stack_;
@@ -167,7 +174,7 @@ class ImagingPage : public QWidget {
   QListWidget *series_list_, *island_list_;
   QLabel *words_, *readout_;
   QProgressBar* progress_;
-  QPushButton *cancel_, *back_, *find_, *keep_, *undo_, *redo_, *make_;
+  QPushButton *cancel_, *back_, *find_, *keep_, *undo_, *redo_, *make_, *send_;
   QComboBox *preset_, *filter_;
   QCheckBox *edges_, *report_;
   QSpinBox* threshold_;

@@ -13,6 +13,7 @@
 #include <utility>
 
 #include "viewer_client/desktop/imaging_page.hpp"
+#include "viewer_client/desktop/landmark_names.hpp"
 
 namespace osteon {
 
@@ -77,12 +78,7 @@ std::bitset<256> ImagingPage::bones_under(const std::array<int, 3>& voxel) const
   return bones_at(scene_.scan.geometry, scene_.islands, scene_.look.kept, voxel, history_.now().corrections);
 }
 
-int ImagingPage::bone_at(const std::array<int, 3>& voxel) const {
-  const std::bitset<256> bones = bones_under(voxel);
-  for (std::size_t bone = 1; bone < bones.size(); ++bone)
-    if (bones.test(bone)) return static_cast<int>(bone);
-  return 0;
-}
+int ImagingPage::bone_at(const std::array<int, 3>& voxel) const { return shown_bone(bones_under(voxel)); }
 
 bool ImagingPage::kept(int island) const {
   return std::ranges::any_of(history_.now().seeds, [&](const KeptSeed& seed) {
@@ -307,12 +303,10 @@ void ImagingPage::refresh_look() {
   look.box = edits.box;
   look.kept = {};
   scene_.seeds.clear();
-  for (std::size_t bone = 1; bone < look.bones.size(); ++bone) look.bones[bone] = tint_of(static_cast<int>(bone), true);
   scene_.landmarks.clear();
   for (const MarkedLandmark& landmark : edits.landmarks)
     if (const auto voxel = scene_.open() ? voxel_of(scene_.scan.geometry, landmark.at_mm) : std::nullopt)
-      scene_.landmarks.push_back({*voxel, QString::fromStdString(landmark.name)});
-  std::array<int, 256> first_bone{};  // of each island
+      scene_.landmarks.push_back({*voxel, landmark_title(landmark.name)});
   for (const KeptSeed& seed : edits.seeds) {
     const auto voxel = scene_.open() ? voxel_of(scene_.scan.geometry, seed.at_mm) : std::nullopt;
     if (!voxel) continue;
@@ -320,20 +314,8 @@ void ImagingPage::refresh_look() {
     const auto island = static_cast<std::size_t>(scene_.islands.number(*voxel));
     if (island == 0 || seed.bone == 0) continue;
     look.kept[island].set(static_cast<std::size_t>(seed.bone));
-    if (first_bone[island] == 0) first_bone[island] = seed.bone;
   }
-  for (std::size_t island = 1; island < look.islands.size(); ++island) {
-    look.islands[island] = tint_of(static_cast<int>(island), first_bone[island] != 0);
-    if (first_bone[island] != 0) look.bones[static_cast<std::size_t>(first_bone[island])] = look.islands[island];
-  }
-  const auto fade = [](Tint& tint, const BoneLabel& label) {
-    tint.strength = static_cast<std::uint8_t>(std::lround(tint.strength * label.opacity_percent / 100.0));
-  };
-  for (const BoneLabel& label : edits.labels) {
-    fade(look.bones[static_cast<std::size_t>(label.bone)], label);
-    for (std::size_t island = 1; island < look.islands.size(); ++island)
-      if (first_bone[island] == label.bone) fade(look.islands[island], label);
-  }
+  set_tints(look, edits.labels);
 }
 
 void ImagingPage::make_bone() {
@@ -350,9 +332,27 @@ void ImagingPage::make_bone() {
         return words_->setText(tr("Seeds of two bones are in one voxel now. Choose a lower threshold, or undo one."));
     }
   show_work(tr("The bone is being made"));
+  sends_made_ = false;
   steps_.make(made_edits(edits, std::move(seeds), scene_.scan.geometry), report_->isChecked());
   events_.busy(steps_.making());
   enable_parts();
+}
+
+void ImagingPage::make_and_send() {
+  if (!send_->isEnabled() || !events_.may_send()) return;
+  make_bone();
+  sends_made_ = steps_.making();
+}
+
+void ImagingPage::use_made(const std::filesystem::path& bone) {
+  events_.busy(false);
+  if (std::exchange(sends_made_, false)) {
+    end_work(tr("The bone is made. Send it in the dialog."));
+    return events_.send(bone);
+  }
+  const QString said = show_report(bone);
+  end_work(said);
+  events_.made(bone, said);
 }
 
 }  // namespace osteon

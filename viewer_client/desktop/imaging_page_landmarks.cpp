@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "viewer_client/desktop/imaging_page.hpp"
+#include "viewer_client/desktop/landmark_names.hpp"
 
 namespace osteon {
 
@@ -38,8 +39,8 @@ void ImagingPage::set_landmark(const std::array<int, 3>& voxel) {
   put_landmark(edits, name, at_mm);
   const QLocale locale;
   words_->setText(tr("%1 is at %2, %3, %4 mm.")
-                      .arg(QString::fromStdString(name), locale.toString(at_mm.x(), 'f', 1),
-                           locale.toString(at_mm.y(), 'f', 1), locale.toString(at_mm.z(), 'f', 1)));
+                      .arg(landmark_title(name), locale.toString(at_mm.x(), 'f', 1), locale.toString(at_mm.y(), 'f', 1),
+                           locale.toString(at_mm.z(), 'f', 1)));
   take(std::move(edits), 0);
 }
 

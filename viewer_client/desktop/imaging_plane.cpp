@@ -148,8 +148,14 @@ void ImagingPlane::paint_marks(QPainter& painter, const PlaneFrame& at) const {
     const auto place = place_in(axes_, seed.voxel);
     if (place[2] != through) continue;
     const auto middle = pixel_of(axes_, at, place[0], place[1]);
+    const QPointF point(middle[0], middle[1]);
     painter.setPen(seed.outside ? kOutside : kLetter);
-    painter.drawEllipse(QPointF(middle[0], middle[1]), kSeedMark_px, kSeedMark_px);
+    // A shape of its own, as in three dimensions: not everybody sees the colours.
+    if (seed.outside)
+      painter.drawPolygon(QPolygonF({point + QPointF(0.0, -kSeedMark_px), point + QPointF(kSeedMark_px, kSeedMark_px),
+                                     point + QPointF(-kSeedMark_px, kSeedMark_px)}));
+    else
+      painter.drawEllipse(point, kSeedMark_px, kSeedMark_px);
   }
   if (!hovered_ || !has_brush()) return;
   const double radius_px = scene_.brush_mm / axes_.right_mm * voxel_px;

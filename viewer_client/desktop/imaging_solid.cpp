@@ -19,6 +19,7 @@ namespace {
 constexpr int kEditPause_ms = 150;  // a drag is many edits
 constexpr int kFrame_px = 1;        // for the frame of the keyboard's focus
 constexpr QColor kFocusFrame{250, 220, 120};
+constexpr double kMarkShare = 0.018;  // radius of a mark, of the diagonal of what is seen
 
 VoxelGrid grid_of(const ScanGeometry& scan) { return {scan.dims, scan.origin_mm, scan.axes_mm}; }
 
@@ -33,10 +34,11 @@ Box corners_of(const ScanGeometry& scan) {
   return box;
 }
 
-Box points_of(const Mesh& mesh) {
+Box points_of(const std::vector<KeptSurface>& surfaces) {
   Box box;
-  for (const auto& [x, y, z] : mesh.positions_mm)
-    box.include({static_cast<double>(x), static_cast<double>(y), static_cast<double>(z)});
+  for (const KeptSurface& of : surfaces)
+    for (const auto& [x, y, z] : of.mesh.positions_mm)
+      box.include({static_cast<double>(x), static_cast<double>(y), static_cast<double>(z)});
   return box;
 }
 
@@ -46,13 +48,12 @@ struct ImagingSolid::Job {
   KeptParts kept;
   bool surface = false, soft = false;  // which are to be made
   std::atomic<bool> cancelled{false};
-  Result<Mesh> mesh;
+  Result<std::vector<KeptSurface>> bones;
   Result<ShownScan> hu;
 };
 
-ImagingSolid::ImagingSolid(const ImagingScene& scene, std::function<void(const std::array<int, 3>& voxel)> look_at,
-                           QWidget* parent)
-    : QWidget(parent), scene_(scene), look_at_(std::move(look_at)) {
+ImagingSolid::ImagingSolid(const ImagingScene& scene, Events events, QWidget* parent)
+    : QWidget(parent), scene_(scene), events_(std::move(events)) {
   setObjectName("solid");
   soft_ = new QCheckBox(tr("Soft tissue"));
   soft_->setObjectName("soft_tissue");
@@ -64,7 +65,9 @@ ImagingSolid::ImagingSolid(const ImagingScene& scene, std::function<void(const s
   hint_->setWordWrap(true);
   hint_->setAlignment(Qt::AlignCenter);
   view_ = new SolidView(
-      {[this](const Vec3& point_mm) { look_at_(voxel_near(scene_.scan.geometry, point_mm)); }, [this] { update(); }});
+      {[this](const SolidHit& hit) { events_.choose_bone(hit.bone, voxel_near(scene_.scan.geometry, hit.point_mm)); },
+       [this](const SolidHit& hit) { events_.look_at(voxel_near(scene_.scan.geometry, hit.point_mm)); },
+       [this] { update(); }});
   stack_ = new QStackedWidget;
   stack_->addWidget(hint_);
   stack_->addWidget(view_);
@@ -105,12 +108,15 @@ void ImagingSolid::release() {
 void ImagingSolid::begin() {
   const QSignalBlocker quiet(soft_);
   soft_->setChecked(false);
-  view_->scene().show_surface({});
+  view_->scene().bones().clear();
+  tints_.clear();
   view_->scene().show_soft_tissue({}, {});
   has_surface_ = false;
   problem_.clear();
   cross_.reset();
-  view_->set_bounds(corners_of(scene_.scan.geometry));
+  const Box bounds = corners_of(scene_.scan.geometry);
+  mark_mm_ = kMarkShare * bounds.size_mm().norm();
+  view_->set_bounds(bounds);
   view_->look_overview();
   show_state();
   refresh();
@@ -121,6 +127,8 @@ KeptParts ImagingSolid::kept() const { return {scene_.look.kept, scene_.look.cor
 void ImagingSolid::refresh() {
   if (!scene_.open()) return;
   show_cross();
+  show_tints();
+  show_marks();
   show_state();
   // With a threshold of the look, the islands are those of another one. Their surface stays until they are found.
   // What was wanted before is asked for again then.
@@ -156,7 +164,7 @@ void ImagingSolid::make(std::unique_ptr<Job> job) {
   // Neither the scan nor the islands change before release().
   maker_.reset(QThread::create([&scene = scene_, &of = *job_] {
     const KeepGoing keep_going = [&of](double /*fraction*/) { return !of.cancelled; };
-    if (of.surface) of.mesh = kept_surface(scene.scan.geometry, scene.islands, of.kept, keep_going);
+    if (of.surface) of.bones = kept_surfaces(scene.scan.geometry, scene.islands, of.kept, keep_going);
     if (of.soft) of.hu = reduced_scan(scene.scan, keep_going);
   }));
   connect(maker_.get(), &QThread::finished, this, [this, number = ++jobs_] {
@@ -173,11 +181,21 @@ void ImagingSolid::make(std::unique_ptr<Job> job) {
 void ImagingSolid::take(Job& done) {
   if (done.surface) {
     shown_ = std::move(done.kept);
-    problem_ = done.mesh ? QString() : tr("This surface is too large. Take a higher threshold, or smooth the scan.");
-    const Mesh mesh = done.mesh ? std::move(*done.mesh) : Mesh();
-    has_surface_ = !mesh.triangles.empty();
-    view_->scene().show_surface(mesh);
-    view_->set_bounds(has_surface_ ? points_of(mesh) : corners_of(scene_.scan.geometry));
+    problem_ = done.bones ? QString() : tr("This surface is too large. Take a higher threshold, or smooth the scan.");
+    const std::vector<KeptSurface> bones = done.bones ? std::move(*done.bones) : std::vector<KeptSurface>();
+    has_surface_ = !bones.empty();
+    SolidBones& shown = view_->scene().bones();
+    shown.clear();
+    tints_.clear();
+    for (const KeptSurface& of : bones) {
+      shown.show(of.bone, of.mesh);
+      tints_[of.bone];
+    }
+    const Box bounds = has_surface_ ? points_of(bones) : corners_of(scene_.scan.geometry);
+    mark_mm_ = kMarkShare * bounds.size_mm().norm();
+    show_tints();
+    show_marks(true);
+    view_->set_bounds(bounds);
   }
   if (done.soft && soft_->isChecked()) {
     has_soft_ = true;
@@ -191,6 +209,30 @@ void ImagingSolid::show_cross() {
   cross_ = scene_.crosshair;
   view_->scene().show_cross(grid_of(scene_.scan.geometry), scene_.crosshair);
   view_->redraw(true);
+}
+
+void ImagingSolid::show_tints() {
+  for (auto& [bone, shown] : tints_) {
+    const Tint& tint = scene_.look.bones[static_cast<std::size_t>(bone)];
+    if (tint == shown) continue;
+    shown = tint;
+    view_->scene().bones().set_paint(bone, {tint.red, tint.green, tint.blue}, opacity_of(tint));
+    view_->redraw();
+  }
+}
+
+void ImagingSolid::show_marks(bool all) {
+  std::array<std::vector<Vec3>, 3> now;
+  for (const ImagingScene::SeedMark& seed : scene_.seeds)
+    now[static_cast<std::size_t>(seed.outside ? SolidMark::outside : SolidMark::seed)].push_back(
+        centre_of(scene_.scan.geometry, seed.voxel));
+  now[static_cast<std::size_t>(SolidMark::scribble)] = painted_points(scene_.look.corrections, 2.0 * mark_mm_);
+  for (std::size_t kind = 0; kind < now.size(); ++kind) {
+    if (!all && now[kind] == marks_[kind]) continue;
+    marks_[kind] = std::move(now[kind]);
+    view_->scene().marks().show(static_cast<SolidMark>(kind), marks_[kind], mark_mm_);
+    view_->redraw();
+  }
 }
 
 void ImagingSolid::show_state() {

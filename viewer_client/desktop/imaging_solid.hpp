@@ -8,8 +8,10 @@
 #include <array>
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <memory>
 #include <optional>
+#include <vector>
 
 #include "viewer_client/desktop/imaging_plane.hpp"
 #include "viewer_client/desktop/solid_view.hpp"
@@ -26,9 +28,12 @@ class ImagingSolid : public QWidget {
   Q_DECLARE_TR_FUNCTIONS(ImagingSolid)
 
  public:
-  // `scene` outlives it. `look_at`: the user has chosen a voxel of the surface.
-  ImagingSolid(const ImagingScene& scene, std::function<void(const std::array<int, 3>& voxel)> look_at,
-               QWidget* parent = nullptr);
+  struct Events {
+    std::function<void(const std::array<int, 3>& voxel)> look_at;                // the user has chosen a voxel
+    std::function<void(int bone, const std::array<int, 3>& voxel)> choose_bone;  // or a bone, at a voxel
+  };
+  // `scene` outlives it.
+  ImagingSolid(const ImagingScene& scene, Events events, QWidget* parent = nullptr);
   ~ImagingSolid() override;
 
   // Call this before the scan or the islands of the scene change, because the other thread reads them. It stops that
@@ -56,13 +61,20 @@ class ImagingSolid : public QWidget {
   void make(std::unique_ptr<Job> job);
   void take(Job& done);
   void show_cross();
+  // The tints of the bones, as on the planes.
+  void show_tints();
+  // `all`: also those that are there, with another radius.
+  void show_marks(bool all = false);
   // Which picture there is, and what it says.
   void show_state();
 
   const ImagingScene& scene_;
-  std::function<void(const std::array<int, 3>& voxel)> look_at_;
+  Events events_;
   std::optional<KeptParts> wanted_, shown_;  // `shown_`: nothing if islands or scan have changed since
   std::optional<std::array<int, 3>> cross_;  // the crosshair of the picture
+  std::map<int, Tint> tints_;                // of the bones of the picture
+  std::array<std::vector<Vec3>, 3> marks_;   // by SolidMark, mm
+  double mark_mm_ = 0.0;                     // their radius
   bool has_surface_ = false, has_soft_ = false;
   QString problem_;  // why there is no surface
   QString notice_;   // in the picture

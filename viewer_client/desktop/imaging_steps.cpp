@@ -32,8 +32,6 @@ bool has_one_scan(const QString& source) {
   return false;
 }
 
-std::filesystem::path edits_of(const std::filesystem::path& bone) { return bone.string() + ".edits.yaml"; }
-
 QStringList options_of(const ScanFilter& filter) {
   QStringList options;
   for (const std::string& option : filter_options(filter)) options << QString::fromStdString(option);
@@ -95,7 +93,7 @@ ImagingSteps::~ImagingSteps() {
   maker_.reset();
   std::error_code ignored;
   if (unfinished && !is_case(out_)) {
-    std::filesystem::remove(edits_of(out_), ignored);
+    std::filesystem::remove(edit_list_of(out_), ignored);
     std::filesystem::remove_all(report_folder(out_), ignored);
   }
   std::filesystem::remove_all(scratch_, ignored);
@@ -263,7 +261,7 @@ void ImagingSteps::find_edges(const ScanGeometry& scan) {
 void ImagingSteps::make(const ImagingEdits& edits, bool with_report) {
   cancelled_ = false;
   out_ = new_case_folder(source_);
-  const QString file = text_of(edits_of(out_));
+  const QString file = text_of(edit_list_of(out_));
   if (!write_edits(file, edits)) return;
   QStringList how{"ct", source_, "--threshold", QString::number(edits.threshold_hu, 'g', 17), "--edits", file};
   how << options_of(edits.filter);

@@ -83,14 +83,24 @@ std::filesystem::path new_case_folder(const QString& source) {
   std::filesystem::path out = cases_folder() / name.toStdString();
   // The edit list or the report of a case that somebody removed may be all that is left of it.
   const auto is_taken = [](const std::filesystem::path& bone) {
-    return is_name_of_example(bone) || std::filesystem::exists(bone) ||
-           std::filesystem::exists(bone.string() + ".edits.yaml") || std::filesystem::exists(report_folder(bone));
+    return is_name_of_example(bone) || std::filesystem::exists(bone) || std::filesystem::exists(edit_list_of(bone)) ||
+           std::filesystem::exists(report_folder(bone));
   };
   for (int n = 2; is_taken(out); ++n) out = cases_folder() / (name.toStdString() + "-" + std::to_string(n));
   return out;
 }
 
 std::filesystem::path report_folder(const std::filesystem::path& bone) { return bone.string() + ".report"; }
+
+std::filesystem::path edit_list_of(const std::filesystem::path& bone) { return bone.string() + ".edits.yaml"; }
+
+void remove_unused_case(const std::filesystem::path& bone) {
+  const std::vector<std::filesystem::path> needed = remembered_bones();
+  if (std::ranges::find(needed, bone) != needed.end()) return;
+  std::error_code ignored;
+  for (const std::filesystem::path& part : {bone, edit_list_of(bone), report_folder(bone)})
+    std::filesystem::remove_all(part, ignored);
+}
 
 std::filesystem::path new_session_folder(const std::filesystem::path& bone) {
   const std::string day = QDateTime::currentDateTime().toString("yyyy-MM-dd-HHmmss").toStdString();

@@ -47,6 +47,10 @@ void remember(const RecentEntry& entry);
 [[nodiscard]] std::filesystem::path new_case_folder(const QString& source);
 // Of the report of a case that was made with one: beside the case.
 [[nodiscard]] std::filesystem::path report_folder(const std::filesystem::path& bone);
+// Of the edit list of a case that image processing made: beside the case, too.
+[[nodiscard]] std::filesystem::path edit_list_of(const std::filesystem::path& bone);
+// Removes a case with its edit list and its report, unless the start page knows a session of it.
+void remove_unused_case(const std::filesystem::path& bone);
 // Made at once, so that no other window takes the same one. If it cannot be made, it is not there.
 [[nodiscard]] std::filesystem::path new_session_folder(const std::filesystem::path& bone);
 // "unpack --into" names a folder so, by the SHA-256 of the file. An import never does.

@@ -38,6 +38,7 @@
 #include "viewer_client/desktop/clipping_panel.hpp"
 #include "viewer_client/desktop/connection_panel.hpp"
 #include "viewer_client/desktop/enabled.hpp"
+#include "viewer_client/desktop/field_sentences.hpp"
 #include "viewer_client/desktop/force_menu.hpp"
 #include "viewer_client/desktop/game_pad_controller.hpp"
 #include "viewer_client/desktop/gauges_panel.hpp"
@@ -288,7 +289,7 @@ void MainWindow::choose_room() {
   fields.remember();
   const auto credentials = fields.credentials();
   if (!credentials) {
-    QMessageBox::warning(this, "Osteon", QString::fromStdString(credentials.error().message));
+    QMessageBox::warning(this, "Osteon", sentence_of(credentials.error()));
     return;
   }
   join({fields.address(), room->text(), name->text(), *credentials});
@@ -369,7 +370,7 @@ void MainWindow::enter_room(const RoomAddress& room) {
   room_ = std::make_unique<RoomLink>(
       options,
       RoomLink::Events{[this] { view_->arrived(); }, [this](const WatchedRoom& joined) { show_joined(joined); },
-                       [this](const Error& error) { room_ended(QString::fromStdString(error.message)); }});
+                       [this](const Error& error) { room_ended(sentence_of(error)); }});
 }
 
 void MainWindow::watch(const RoomAddress& room) {
@@ -537,16 +538,15 @@ void MainWindow::send_pointer() {
 
 void MainWindow::ask(RoomLink::Request request, const QString& done) {
   if (!room_) return;
-  room_->ask(std::move(request), [this, done](const Result<RoomAnswer>& answer) {
-    say(answer ? done : QString::fromStdString(answer.error().message));
-  });
+  room_->ask(std::move(request),
+             [this, done](const Result<RoomAnswer>& answer) { say(answer ? done : sentence_of(answer.error())); });
 }
 
 void MainWindow::mark_before(const QString& what) {
   if (!room_) return;
   room_->ask([label = what.toStdString()](RoomSubscription& room) { return room.mark(label); },
              [this](const Result<RoomAnswer>& answer) {
-               if (!answer) return say(QString::fromStdString(answer.error().message));  // such as a full disk
+               if (!answer) return say(sentence_of(answer.error()));  // such as a full disk
                undo_points_.push_back(answer->place);
              });
 }
@@ -627,7 +627,7 @@ void MainWindow::follow_pad() {
 
 void MainWindow::refresh_gauges() {
   if (!room_) return;
-  if (const auto failed = room_->failure_seen()) return room_ended(QString::fromStdString(failed->message));
+  if (const auto failed = room_->failure_seen()) return room_ended(sentence_of(*failed));
   sound_control_->refresh();
   connection_->setText(room_->interrupted() ? tr("Connection lost, trying again")
                                             : tr("Connected to %1").arg(address_));

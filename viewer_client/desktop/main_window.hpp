@@ -63,6 +63,8 @@ class MainWindow : public QMainWindow {
   // Opens the dialog that sends a case to a server. `what`: the folder of a case, or a file with one. A dialog that is
   // at work stays instead.
   void send_case(const std::filesystem::path& what);
+  // The same for a case that image processing has made to be sent: it stays on this computer only if it is sent.
+  void send_made_case(const std::filesystem::path& bone);
   void open_example(const ExampleBone& bone);
   void join(const RoomAddress& room);
   // Joins, but only to look: no tool can be taken, and nothing be placed or undone. The view follows the work.
@@ -120,6 +122,7 @@ class MainWindow : public QMainWindow {
   void save_bone_as();
   // The open bone, or else one that the user chooses.
   void choose_case_to_send();
+  void open_send_dialog(const std::filesystem::path& what, const QString& title, bool stays);
   // A case is being sent: says so, and shows its dialog.
   bool sends_already();
   void choose_room();

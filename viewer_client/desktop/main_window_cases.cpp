@@ -126,6 +126,8 @@ void MainWindow::make_imaging_page() {
                                 practise(bone);
                                 say(said);
                               },
+                              [this] { return !sends_already(); },
+                              [this](const std::filesystem::path& bone) { send_made_case(bone); },
                               [this] { pages_->setCurrentWidget(start_); }});
   pages_->addWidget(imaging_);
   connect(pages_, &QStackedWidget::currentChanged, this, [this] { lay_out_page(); });
@@ -176,11 +178,22 @@ void MainWindow::choose_case_to_send() {
 
 void MainWindow::send_case(const std::filesystem::path& what) {
   if (sends_already()) return;
+  open_send_dialog(what, is_file(what) ? text_of(what.filename()) : case_title(what), true);
+}
+
+void MainWindow::send_made_case(const std::filesystem::path& bone) {
+  // Begun from the menu while the case was made. That work is not thrown away.
+  if (sends_already())
+    return say(tr("Another case is being sent. The new one is in %1; send it after that.").arg(text_of(bone)));
+  open_send_dialog(bone, case_title(bone), false);
+}
+
+void MainWindow::open_send_dialog(const std::filesystem::path& what, const QString& title, bool stays) {
   const auto ended = [this](bool sent) {
     if (std::exchange(closes_when_sent_, false) && sent) close();
   };
-  sender_ =
-      std::make_unique<SendDialog>(what, is_file(what) ? text_of(what.filename()) : case_title(what), ended, this);
+  sender_ = std::make_unique<SendDialog>(what, title, stays ? SendDialog::Stays::always : SendDialog::Stays::if_sent,
+                                         ended, this);
   sender_->show();
   sender_->raise();
   sender_->activateWindow();

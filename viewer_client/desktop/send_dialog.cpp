@@ -9,12 +9,14 @@
 #include <utility>
 
 #include "viewer_client/desktop/enabled.hpp"
+#include "viewer_client/desktop/field_sentences.hpp"
+#include "viewer_client/desktop/library.hpp"
 
 namespace osteon {
 
-SendDialog::SendDialog(std::filesystem::path what, const QString& title, std::function<void(bool sent)> ended,
-                       QWidget* parent)
-    : QDialog(parent), what_(std::move(what)), ended_(std::move(ended)) {
+SendDialog::SendDialog(std::filesystem::path what, const QString& title, Stays stays,
+                       std::function<void(bool sent)> ended, QWidget* parent)
+    : QDialog(parent), what_(std::move(what)), drops_(stays == Stays::if_sent), ended_(std::move(ended)) {
   setObjectName("send_dialog");
   setWindowTitle(tr("Send %1 to a server").arg(title));
   auto* all = new QVBoxLayout(this);
@@ -46,13 +48,26 @@ SendDialog::SendDialog(std::filesystem::path what, const QString& title, std::fu
   connect(send_, &QPushButton::clicked, this, [this] { send(); });
   connect(close_, &QPushButton::clicked, this, [this] { reject(); });
   all->addWidget(buttons);
-  end(tr("The server checks the case and keeps it. Whoever may open rooms there can send it."));
+  QString first = tr("The server checks the case and keeps it. Whoever may open rooms there can send it.");
+  if (drops_) first += ' ' + tr("On this computer the case stays only if it is sent.");
+  end(first);
 }
 
-SendDialog::~SendDialog() = default;
+SendDialog::~SendDialog() {
+  sending_.reset();  // it reads the case
+  drop_unsent();
+}
+
+void SendDialog::drop_unsent() {
+  // Once: another case may get its name.
+  if (std::exchange(drops_, false)) remove_unused_case(what_);
+}
 
 void SendDialog::reject() {
-  if (!sending_) return QDialog::reject();
+  if (!sending_) {
+    drop_unsent();
+    return QDialog::reject();
+  }
   words_->setText(tr("Cancelling…"));
   sending_->cancel();
 }
@@ -61,7 +76,7 @@ void SendDialog::send() {
   if (sending_) return;
   fields_->remember();
   const auto credentials = fields_->credentials();
-  if (!credentials) return end(QString::fromStdString(credentials.error().message));
+  if (!credentials) return end(sentence_of(credentials.error()));
   sending_ = std::make_unique<CaseSending>(
       what_, RoomAddress{fields_->address(), room_->text().trimmed(), {}, *credentials},
       CaseSending::Events{[this](CaseSending::Stage stage) { show_stage(stage); },
@@ -72,11 +87,14 @@ void SendDialog::send() {
                           [this](const QString& sentence, const QString& room) {
                             if (!room.isEmpty()) remember_field("room", room);  // where "Join a room" goes next
                             room_->clear();
+                            drops_ = false;
                             end(sentence);
                             ended_(true);
                           },
                           [this](const QString& sentence) {
-                            end(sentence);
+                            end(!sentence.isEmpty() ? sentence
+                                : drops_ ? tr("Cancelled. The server stored nothing. Send the case again, or close.")
+                                         : tr("Cancelled. The server stored nothing, and the case here stays."));
                             ended_(false);
                           }});
   progress_->show();

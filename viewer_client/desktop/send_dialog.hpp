@@ -22,9 +22,12 @@ class SendDialog : public QDialog {
   Q_DECLARE_TR_FUNCTIONS(SendDialog)
 
  public:
-  // `what`: the folder of a case, or a file with one. `title`: for people.
+  enum class Stays { always, if_sent };  // the case, on this computer
+  // `what`: the folder of a case, or a file with one. `title`: for people. A case that stays if it is sent goes with
+  // the dialog, or when that is closed, together with its edit list and its report.
   // `ended`: after each sending; `sent`: it went well.
-  SendDialog(std::filesystem::path what, const QString& title, std::function<void(bool sent)> ended, QWidget* parent);
+  SendDialog(std::filesystem::path what, const QString& title, Stays stays, std::function<void(bool sent)> ended,
+             QWidget* parent);
   ~SendDialog() override;
 
   [[nodiscard]] bool sending() const { return sending_ != nullptr; }
@@ -35,9 +38,12 @@ class SendDialog : public QDialog {
   void send();
   void show_stage(CaseSending::Stage stage);
   void end(const QString& sentence);
+  // A case that stays if it is sent, and was not.
+  void drop_unsent();
   void enable_parts();
 
-  std::filesystem::path what_;
+  const std::filesystem::path what_;
+  bool drops_;  // the case is still one that stays only if it is sent
   std::function<void(bool sent)> ended_;
   std::optional<ServerFields> fields_;
   QLineEdit* room_ = nullptr;

@@ -195,8 +195,12 @@ void SliceView::paint_drawn(QPainter& painter) const {
     for (const std::size_t end : {std::size_t{0}, std::size_t{1}})
       if (std::abs(depth_mm(plane, points[end])) <= kEndDepth_mm)
         painter.fillRect(QRectF(place_of(points[end]) - QPointF(3.5, 3.5), QSizeF(7, 7)), colour);
-    write_outlined(painter, QRect(second.toPoint() + QPoint(8, -18), QSize(width(), 16)),
-                   Qt::AlignLeft | Qt::AlignVCenter, QString::fromStdString(one.words), colour);
+    // The words of an axis that comes from the right are on its left, so that they do not cover it.
+    const QSize size(width(), 16);
+    const bool on_left = one.kind == AnnotationKind::axis && first.x() > second.x();
+    write_outlined(painter, QRect(second.toPoint() + QPoint(on_left ? -8 - size.width() : 8, -18), size),
+                   (on_left ? Qt::AlignRight : Qt::AlignLeft) | Qt::AlignVCenter, QString::fromStdString(one.words),
+                   colour);
   }
   if (!overlay_.begun) return;
   painter.setPen(QPen(QColor(kPlannedColour), 2.0));

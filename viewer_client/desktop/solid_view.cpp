@@ -1,5 +1,6 @@
 #include "viewer_client/desktop/solid_view.hpp"
 
+#include <QApplication>
 #include <QKeyEvent>
 #include <QMouseEvent>
 #include <algorithm>
@@ -30,7 +31,7 @@ SolidView::SolidView(Events events, QWidget* parent) : QVTKOpenGLNativeWidget(pa
   setObjectName("solid_view");
   setAccessibleName(tr("Three dimensions"));
   setFocusPolicy(Qt::StrongFocus);
-  setToolTip(tr("Left drag: turn. Wheel: nearer. Double click or Enter: the crosshair goes there. Home: all."));
+  setToolTip(tr("Click: a bone's row. Double click, Enter: crosshair too. Drag: turn. Wheel: nearer. Home: all."));
   frame_timer_.setSingleShot(true);
   connect(&frame_timer_, &QTimer::timeout, this, [this] { draw(); });
   rest_timer_.setSingleShot(true);
@@ -89,11 +90,12 @@ void SolidView::look_whole(const CameraView& from) {
   scene_->look(fitted(from, bounds_, static_cast<double>(std::max(1, width())) / std::max(1, height())));
 }
 
-void SolidView::choose(const QPoint& at) {
+void SolidView::choose(const QPoint& at, bool point) {
   const double ratio = devicePixelRatioF();
-  const auto point =
-      scene().surface_at(static_cast<int>((at.x() + 0.5) * ratio), static_cast<int>((at.y() + 0.5) * ratio));
-  if (point) events_.chosen(*point);
+  const auto hit = scene().bone_at(static_cast<int>((at.x() + 0.5) * ratio), static_cast<int>((at.y() + 0.5) * ratio));
+  if (!hit) return;
+  events_.bone(*hit);
+  if (point) events_.point(*hit);
 }
 
 // A picture that was asked for before there was a context was not drawn.
@@ -113,10 +115,20 @@ void SolidView::showEvent(QShowEvent* event) {
   redraw();
 }
 
-void SolidView::mousePressEvent(QMouseEvent* event) { last_ = event->pos(); }
+void SolidView::mousePressEvent(QMouseEvent* event) {
+  last_ = event->pos();
+  clicking_ = event->button() == Qt::LeftButton;
+}
+
+void SolidView::mouseReleaseEvent(QMouseEvent* event) {
+  if (std::exchange(clicking_, false) && event->button() == Qt::LeftButton) choose(event->pos(), false);
+}
 
 void SolidView::mouseMoveEvent(QMouseEvent* event) {
   const QPoint by = event->pos() - last_;
+  // A hand on the mouse trembles.
+  if (clicking_ && by.manhattanLength() < QApplication::startDragDistance()) return;
+  clicking_ = false;
   last_ = event->pos();
   if ((event->buttons() & Qt::LeftButton) != 0 && (event->modifiers() & Qt::ShiftModifier) == 0)
     return move(orbited(camera(), kTurnRadPerPixel * by.x(), -kTurnRadPerPixel * by.y()));
@@ -126,7 +138,7 @@ void SolidView::mouseMoveEvent(QMouseEvent* event) {
 }
 
 void SolidView::mouseDoubleClickEvent(QMouseEvent* event) {
-  if (event->button() == Qt::LeftButton) choose(event->pos());
+  if (event->button() == Qt::LeftButton) choose(event->pos(), true);
 }
 
 void SolidView::wheelEvent(QWheelEvent* event) {
@@ -159,7 +171,7 @@ void SolidView::keyPressEvent(QKeyEvent* event) {
       return look_overview();
     case Qt::Key_Return:
     case Qt::Key_Enter:
-      return choose(rect().center());
+      return choose(rect().center(), true);
     default:
       event->ignore();  // not VTK's keys: the window has its own
   }

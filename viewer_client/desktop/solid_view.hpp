@@ -1,6 +1,6 @@
 // The picture of a scan in three dimensions, and the mouse over it: a drag turns it, the wheel brings it nearer, a
-// double click chooses a point of the surface. Shift and a drag move it aside. Arrow keys, with Shift too, + and -, and
-// Enter do the same; Enter takes the middle of the picture. Home shows all.
+// click chooses a bone, and a double click a point of its surface. Shift and a drag move it aside. Arrow keys, with
+// Shift too, + and -, and Enter do the same; Enter takes the middle of the picture. Home shows all.
 #pragma once
 #include <QCoreApplication>
 #include <QPoint>
@@ -22,8 +22,8 @@ class SolidView : public QVTKOpenGLNativeWidget {
 
  public:
   struct Events {
-    std::function<void(const Vec3& point_mm)> chosen;  // a point of the surface, bone frame
-    std::function<void()> focused;                     // the keyboard's focus came or went
+    std::function<void(const SolidHit&hit)> bone, point;  // that the user has chosen
+    std::function<void()> focused;                        // the keyboard's focus came or went
   };
   explicit SolidView(Events events, QWidget* parent = nullptr);
   ~SolidView() override;
@@ -53,6 +53,7 @@ class SolidView : public QVTKOpenGLNativeWidget {
   void showEvent(QShowEvent* event) override;
   void mousePressEvent(QMouseEvent* event) override;
   void mouseMoveEvent(QMouseEvent* event) override;
+  void mouseReleaseEvent(QMouseEvent* event) override;
   void mouseDoubleClickEvent(QMouseEvent* event) override;
   void wheelEvent(QWheelEvent* event) override;
   void keyPressEvent(QKeyEvent* event) override;
@@ -64,13 +65,15 @@ class SolidView : public QVTKOpenGLNativeWidget {
   // The user moves the camera.
   void move(const CameraView& view);
   void look_whole(const CameraView& from);
-  void choose(const QPoint& at);
+  // Of the bone at a pixel of the widget, if there is one.
+  void choose(const QPoint& at, bool point);
 
   Events events_;
   std::unique_ptr<SolidScene> scene_;
   Box bounds_;
-  QPoint last_;        // position of the mouse
-  bool whole_ = true;  // nobody has moved the camera
+  QPoint last_;            // position of the mouse
+  bool clicking_ = false;  // its left button is down, and nothing has moved
+  bool whole_ = true;      // nobody has moved the camera
   QTimer frame_timer_, rest_timer_;
   std::chrono::steady_clock::time_point next_frame_{};
   bool moving_ = false, drawing_ = false;

@@ -121,6 +121,12 @@ VoxelRange range_of(const ScanGeometry& scan, const std::optional<MarkedBox>& bo
   return range;
 }
 
+int shown_bone(const std::bitset<256>& bones) {
+  for (std::size_t bone = 1; bone < bones.size(); ++bone)
+    if (bones.test(bone)) return static_cast<int>(bone);
+  return 0;
+}
+
 bool reaches(const ScanGeometry& scan, const VoxelRange& range, const Correction& stroke) {
   bool found = false;
   each_voxel(scan, range, stroke, [&](const std::array<int, 3>&) {

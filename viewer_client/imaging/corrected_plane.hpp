@@ -32,6 +32,9 @@ struct VoxelRange {
 // The bones that grow in each island, by their numbers.
 using BonesOfIslands = std::array<std::bitset<256>, 256>;
 
+// Of several bones in one place, the one whose tint is shown: the lowest. 0: there is none.
+[[nodiscard]] int shown_bone(const std::bitset<256>& bones);
+
 // Of each pixel of a plane, rows from the top: 0, or the number of the bone that is painted there, or kErased. Empty:
 // there are no corrections. They come in their order, as osteon-import replays them. Where one island has several
 // bones, nobody knows yet where the importer parts them: a cut of one shows on the whole island.

@@ -1,7 +1,8 @@
-// The surface of what is kept of a scan, as far as it is known before osteon-import makes the bone.
+// The surfaces of the bones that are kept of a scan, as far as they are known before osteon-import makes the bone.
 #pragma once
 #include <array>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "common/core/keep_going.hpp"
@@ -18,12 +19,26 @@ struct KeptParts {
   friend bool operator==(const KeptParts&, const KeptParts&) = default;
 };
 
-// The surface of the voxels that the planes show as kept (corrected_plane()), within the box, at the resolution of
-// reduced_scan(). A block is solid if a quarter of it is kept, so that thin bone is not lost. Closed, bone frame, mm,
-// with normals. It holds two slices of blocks at a time, and no volume. `keep_going` is asked before each slice of the
-// scan. Errors: cancelled, exhausted (too many triangles).
-[[nodiscard]] Result<Mesh> kept_surface(const ScanGeometry& scan, const IslandMap& islands, const KeptParts& kept,
-                                        const KeepGoing& keep_going);
+struct KeptSurface {
+  int bone = 0;
+  Mesh mesh;
+};
+
+// The surfaces of the voxels that the planes show as kept (corrected_plane()), within the box, at the resolution of
+// reduced_scan(), by the bone whose tint they have there (shown_bone()), lowest first. A block is solid if a quarter of
+// it is kept, so that thin bone is not lost; it is of the bone that has most of it. Each surface is closed, bone frame,
+// mm, with normals. It holds a byte for each block. `keep_going` is asked before each slice of the scan and each
+// surface. Errors: cancelled, exhausted (too many triangles).
+[[nodiscard]] Result<std::vector<KeptSurface>> kept_surfaces(const ScanGeometry& scan, const IslandMap& islands,
+                                                             const KeptParts& kept, const KeepGoing& keep_going);
+
+// The island of a bone (shown_bone()) that is nearest to a voxel within a block and a voxel, or else the first one of
+// that bone. 0: it has none, so it is painted.
+[[nodiscard]] int island_near(const ScanGeometry& scan, const IslandMap& islands, const BonesOfIslands& bones, int bone,
+                              const std::array<int, 3>& voxel);
+
+// Points of the strokes that paint, for marks: the first one of each, and then one for each `least_mm` at most.
+[[nodiscard]] std::vector<Vec3> painted_points(std::span<const SharedCorrection> corrections, double least_mm);
 
 // The voxel of the scan that is nearest to a point of its surface. Where the bone reaches the scan's end, the surface
 // lies beyond it, by less than a block.

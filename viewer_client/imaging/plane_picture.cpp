@@ -1,5 +1,7 @@
 #include "viewer_client/imaging/plane_picture.hpp"
 
+#include <cmath>
+
 namespace osteon {
 
 namespace {
@@ -31,6 +33,27 @@ Tint tint_of(int island, bool kept) {
   tint.strength = kept ? kKept : kLeftOut;
   return tint;
 }
+
+void set_tints(PlaneLook& look, std::span<const BoneLabel> labels) {
+  for (std::size_t bone = 1; bone < look.bones.size(); ++bone) look.bones[bone] = tint_of(static_cast<int>(bone), true);
+  std::bitset<256> coloured;
+  for (std::size_t island = 1; island < look.islands.size(); ++island) {
+    const auto bone = static_cast<std::size_t>(shown_bone(look.kept[island]));
+    if (bone == 0 || coloured.test(bone)) continue;
+    coloured.set(bone);
+    look.bones[bone] = tint_of(static_cast<int>(island), true);
+  }
+  for (const BoneLabel& label : labels) {
+    Tint& tint = look.bones[static_cast<std::size_t>(label.bone)];
+    tint.strength = static_cast<std::uint8_t>(std::lround(tint.strength * label.opacity_percent / 100.0));
+  }
+  for (std::size_t island = 1; island < look.islands.size(); ++island) {
+    const auto bone = static_cast<std::size_t>(shown_bone(look.kept[island]));
+    look.islands[island] = bone != 0 ? look.bones[bone] : tint_of(static_cast<int>(island), false);
+  }
+}
+
+double opacity_of(const Tint& tint) { return static_cast<double>(tint.strength) / kKept; }
 
 std::vector<std::uint32_t> draw_plane(const ShownScan& scan, const IslandMap& islands, const PlaneAxes& axes, int slice,
                                       const PlaneLook& look, const GreyTable& greys) {

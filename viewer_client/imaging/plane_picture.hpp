@@ -3,6 +3,7 @@
 #include <array>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "viewer_client/imaging/corrected_plane.hpp"
@@ -31,6 +32,12 @@ struct PlaneLook {
   // 1: a voxel of an edge, tinted over all else. Of the same grid as the scan; empty: none are shown.
   VoxelFile<std::uint8_t> edges = {};
 };
+
+// Gives bones and islands their tints. A bone has the colour of the first island in which it is the shown one, or else
+// one by its number, and the opacity of its label. A kept island has the tint of its shown bone.
+void set_tints(PlaneLook& look, std::span<const BoneLabel> labels);
+// Of the surface of a bone with this tint: 1 is opaque, as its tint is at its strongest.
+[[nodiscard]] double opacity_of(const Tint& tint);
 
 // One pixel for each voxel, 0xffRRGGBB, rows from the top. With a threshold the islands, which are of another one, are
 // not tinted. Corrections are tinted over all else.

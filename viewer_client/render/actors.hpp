@@ -27,5 +27,7 @@ using Colour = std::array<std::uint8_t, 3>;  // red, green, blue
                                                      std::span<const std::array<std::uint32_t, 3>> triangles);
 
 [[nodiscard]] vtkSmartPointer<vtkActor> actor_of(vtkPolyData* data);
+// The closed surface of a bone in the light.
+[[nodiscard]] vtkSmartPointer<vtkActor> bone_actor(vtkPolyData* data);
 
 }  // namespace osteon

@@ -102,19 +102,6 @@ vtkSmartPointer<vtkPolyData> coloured(const Mesh& mesh, BodyId body, const Densi
   return poly_data(mesh.positions_mm, mesh.normals, colours, mesh.triangles);
 }
 
-vtkSmartPointer<vtkActor> bone_actor(vtkPolyData* data) {
-  auto actor = actor_of(data);
-  vtkProperty* bone = actor->GetProperty();
-  bone->SetInterpolationToPhong();
-  bone->SetAmbient(0.10);
-  bone->SetDiffuse(0.88);
-  bone->SetSpecular(0.13);
-  bone->SetSpecularPower(22.0);
-  // A closed surface hides its back faces. Not drawing them saves a third of a frame in software.
-  bone->SetBackfaceCulling(1);
-  return actor;
-}
-
 }  // namespace
 
 struct BoneActors::Impl {

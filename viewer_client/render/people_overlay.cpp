@@ -24,6 +24,7 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <optional>
 #include <utility>
 
 #include "viewer_client/scene/people_view.hpp"
@@ -146,8 +147,9 @@ struct PeopleOverlay::Impl {
   void add(const Words& words);
   void remove(const Words& words);
   static void show(const Words& words, const std::string& text);  // empty: hides it
-  void put_beside(const Words& words, const Vec3& point_mm);
-  void put_beside(vtkTextActor* text, int picture, const Vec3& point_mm);
+  // `from_mm`: where the line begins that ends at the point. The text does not cover it.
+  void put_beside(const Words& words, const Vec3& point_mm, const std::optional<Vec3>& from_mm = {});
+  void put_beside(vtkTextActor* text, int picture, const Vec3& point_mm, const std::optional<Vec3>& from_mm);
 };
 
 PeopleOverlay::PeopleOverlay(const BonePictures& bone, vtkRenderWindow& window, NormalAt normal_at)
@@ -352,13 +354,15 @@ double PeopleOverlay::Impl::mm_per_px(const Vec3& point_mm) const {
   return 2.0 * half * (point_mm - eye).dot(sight) / std::max(1, window.GetSize()[1]);
 }
 
-void PeopleOverlay::Impl::put_beside(const Words& words, const Vec3& point_mm) {
+void PeopleOverlay::Impl::put_beside(const Words& words, const Vec3& point_mm, const std::optional<Vec3>& from_mm) {
   for (int picture = 0; picture < pictures; ++picture)
-    put_beside(words[static_cast<std::size_t>(picture)], picture, point_mm);
+    put_beside(words[static_cast<std::size_t>(picture)], picture, point_mm, from_mm);
 }
 
-// To the right of the point. If another text is there already, it moves towards the picture's middle row.
-void PeopleOverlay::Impl::put_beside(vtkTextActor* text, int picture, const Vec3& point_mm) {
+// To the right of the point, or to the left of one to which a line comes from the right. If another text is there
+// already, it moves towards the picture's middle row.
+void PeopleOverlay::Impl::put_beside(vtkTextActor* text, int picture, const Vec3& point_mm,
+                                     const std::optional<Vec3>& from_mm) {
   const auto [x, y] = layer.on_screen(picture, {point_mm.x(), point_mm.y(), point_mm.z()});
   const LayerAbove::Frame frame = layer.frame(picture);
   const bool seen = mm_per_px(point_mm) > 0.0 && x >= 0 && y >= 0 && x < frame.width && y < frame.height;
@@ -368,9 +372,12 @@ void PeopleOverlay::Impl::put_beside(vtkTextActor* text, int picture, const Vec3
   text->SetPosition(0, 0);
   text->GetBoundingBox(layer.above(picture), box);
   const int width = static_cast<int>(box[1] - box[0]) + 1, height = static_cast<int>(box[3] - box[2]) + 1;
-  // To the left where the picture ends on the right.
-  int left = static_cast<int>(std::lround(x + kBeside)), bottom = static_cast<int>(std::lround(y)) - height / 2;
-  if (left + width > frame.width) left = static_cast<int>(std::lround(x - kBeside)) - width;
+  // On the other side where the picture ends.
+  const int on_right = static_cast<int>(std::lround(x + kBeside));
+  const int on_left = static_cast<int>(std::lround(x - kBeside)) - width;
+  const bool leftwards = from_mm && layer.on_screen(picture, {from_mm->x(), from_mm->y(), from_mm->z()})[0] > x;
+  int left = leftwards && on_left >= 0 ? on_left : on_right, bottom = static_cast<int>(std::lround(y)) - height / 2;
+  if (left + width > frame.width) left = on_left;
   const bool upwards = y < 0.5 * frame.height;
   auto& texts = taken[static_cast<std::size_t>(picture)];
   for (bool free = false; !free;) {
@@ -390,11 +397,13 @@ void PeopleOverlay::Impl::place(Drawn& one) {
   const Vec3& at = one.points_mm.front();
   const double px_mm = std::max(1e-6, mm_per_px(at));
   Vec3 beside = at;
+  std::optional<Vec3> from;
   vtkNew<vtkMatrix4x4> matrix;
   if (one.annotation.kind == AnnotationKind::plane) {
     beside = one.points_mm[1];
   } else if (one.tube) {
     beside = one.points_mm.back();
+    if (one.annotation.kind == AnnotationKind::axis) from = at;
     const Vec3& middle = one.points_mm[one.points_mm.size() / 2];
     const double radius_mm = kTube * std::max(1e-6, mm_per_px(middle));
     // Rebuilt only if the difference is visible.
@@ -429,7 +438,7 @@ void PeopleOverlay::Impl::place(Drawn& one) {
   const std::string words = wrapped(words_of(one.annotation), 40, 4);
   show(one.words, words);
   if (words.empty()) return;
-  put_beside(one.words, beside);
+  put_beside(one.words, beside, from);
 }
 
 void PeopleOverlay::place(bool two_pictures) {

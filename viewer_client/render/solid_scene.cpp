@@ -8,7 +8,6 @@
 #include <vtkRenderWindow.h>
 #include <vtkRenderer.h>
 
-#include "viewer_client/render/bone_actors.hpp"
 #include "viewer_client/render/layer_above.hpp"
 #include "viewer_client/render/lighting.hpp"
 #include "viewer_client/render/orientation_marker.hpp"
@@ -44,11 +43,13 @@ struct SolidScene::Impl {
       renderer->AddActor(line.before);
       layer->add(line.behind, 0);
     }
+    marks.emplace(*layer);
     marker.show(true);
   }
   Impl(const Impl&) = delete;
   Impl& operator=(const Impl&) = delete;
   ~Impl() {
+    marks.reset();
     layer.reset();
     window.RemoveRenderer(renderer);
   }
@@ -61,11 +62,12 @@ struct SolidScene::Impl {
 
   vtkRenderWindow& window;
   vtkNew<vtkRenderer> renderer;
-  BoneActors bone{*renderer};
+  SolidBones bones{*renderer};
   SoftTissue soft{*renderer};
   StatusText status{*renderer};
   OrientationMarker marker{window};
   std::optional<LayerAbove> layer;
+  std::optional<SolidMarks> marks;
   std::array<CrossLine, 3> cross;
 };
 
@@ -73,11 +75,9 @@ SolidScene::SolidScene(vtkRenderWindow& window) : impl_(std::make_unique<Impl>(w
 
 SolidScene::~SolidScene() = default;
 
-void SolidScene::show_surface(const Mesh& mesh) {
-  if (!impl_->bone.show({}, mesh)) return;
-  impl_->bone.remove();
-  impl_->bone.add();
-}
+SolidBones& SolidScene::bones() { return impl_->bones; }
+
+SolidMarks& SolidScene::marks() { return *impl_->marks; }
 
 void SolidScene::show_soft_tissue(const VoxelGrid& grid, std::span<const std::int16_t> hu) {
   hu.empty() ? impl_->soft.hide() : impl_->soft.show(grid, hu);
@@ -98,8 +98,8 @@ void SolidScene::show_cross(const VoxelGrid& grid, const std::array<int, 3>& vox
 
 void SolidScene::show_notice(const std::string& notice) { impl_->status.show({}, notice); }
 
-std::optional<Vec3> SolidScene::surface_at(int x_px, int y_px) const {
-  return impl_->bone.surface_at(x_px, impl_->window.GetActualSize()[1] - 1 - y_px);
+std::optional<SolidHit> SolidScene::bone_at(int x_px, int y_px) const {
+  return impl_->bones.at(x_px, impl_->window.GetActualSize()[1] - 1 - y_px);
 }
 
 void SolidScene::look(const CameraView& view) {

@@ -1,4 +1,4 @@
-// The picture of a scan in three dimensions: the surface of what is kept, the crosshair, and soft tissue. Its owner
+// The picture of a scan in three dimensions: the bones that are kept, marks, the crosshair, and soft tissue. Its owner
 // gives the window and decides when to draw. All functions: [render], the thread that owns the window.
 #pragma once
 #include <array>
@@ -9,8 +9,9 @@
 #include <string>
 
 #include "common/surface/label_surface.hpp"
-#include "common/surface/mesh_block.hpp"
 #include "viewer_client/render/image.hpp"
+#include "viewer_client/render/solid_bones.hpp"
+#include "viewer_client/render/solid_marks.hpp"
 #include "viewer_client/scene/camera_view.hpp"
 
 class vtkRenderWindow;
@@ -23,18 +24,18 @@ class SolidScene {
   explicit SolidScene(vtkRenderWindow& window);
   ~SolidScene();
 
-  // In the bone's frame. An empty mesh: no surface.
-  void show_surface(const Mesh& mesh);
+  [[nodiscard]] SolidBones& bones();
+  [[nodiscard]] SolidMarks& marks();
   // Copies the HU, see SoftTissue. Empty: none.
   void show_soft_tissue(const VoxelGrid& grid, std::span<const std::int16_t> hu);
   [[nodiscard]] bool has_soft_tissue() const;
-  // Three lines through the voxel of the crosshair, to the ends of the grid. They are faint behind the surface.
+  // Three lines through the voxel of the crosshair, to the ends of the grid. They are faint behind the bones.
   void show_cross(const VoxelGrid& grid, const std::array<int, 3>& voxel);
   // UTF-8; empty: nothing.
   void show_notice(const std::string& notice);
 
-  // The point of the surface at a pixel, bone frame. Columns from the left, rows from the top.
-  [[nodiscard]] std::optional<Vec3> surface_at(int x_px, int y_px) const;
+  // The bone at a pixel. Columns from the left, rows from the top.
+  [[nodiscard]] std::optional<SolidHit> bone_at(int x_px, int y_px) const;
 
   void look(const CameraView& view);
   [[nodiscard]] CameraView camera() const;

@@ -72,6 +72,19 @@ TEST_F(PeoplePicture, AnAxisIsALineWithAMarkAtItsTarget) {
   EXPECT_EQ(differing_pixels(with({}), bare_), 0);
 }
 
+// Its words stand beside its target, whatever side it comes from.
+TEST_F(PeoplePicture, TheWordsOfAnAxisDoNotCoverIt) {
+  const double before_mm = -kRadius_mm - 2.0;
+  for (const double side : {1.0, -1.0}) {
+    const Vec3 entry(-9 * side, before_mm, 0), target(3 * side, before_mm, 0);
+    const Image plain = with({mark(1, AnnotationKind::axis, {entry, target})});
+    const Image named = with({mark(1, AnnotationKind::axis, {entry, target}, "Axis 1")});
+    EXPECT_GT(differing_pixels(plain, named), 100) << "the words";
+    for (double x = -9.0; x <= 3.0; x += 0.5)
+      EXPECT_EQ(at(named, {x * side, before_mm, 0}), at(plain, {x * side, before_mm, 0})) << side << " at " << x;
+  }
+}
+
 TEST_F(PeoplePicture, APlaneIsATranslucentRectangleFromBothSides) {
   const double before_mm = -kRadius_mm - 2.0;
   const Vec3 first(-15, before_mm, 0), second(15, before_mm, 0), up(-15, before_mm, 20), down(-15, before_mm, -20);

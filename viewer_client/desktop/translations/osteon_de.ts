@@ -248,10 +248,6 @@
 <context>
     <name>CaseSending</name>
     <message>
-        <source>Cancelled. The server stored nothing, and the case here stays.</source>
-        <translation>Abgebrochen. Der Server hat nichts gespeichert, und der Fall hier bleibt.</translation>
-    </message>
-    <message>
         <source>Cancelled. A server that had already checked the case may have it.</source>
         <translation>Abgebrochen. Hatte der Server den Fall schon geprüft, hat er ihn vielleicht.</translation>
     </message>
@@ -1125,6 +1121,26 @@
         <source>With a rep&amp;ort</source>
         <translation>Mit Beri&amp;cht</translation>
     </message>
+    <message>
+        <source>Send to a server…</source>
+        <translation>An einen Server senden…</translation>
+    </message>
+    <message>
+        <source>Makes a case of the kept bones, and opens the dialog that sends it</source>
+        <translation>Macht aus den behaltenen Knochen einen Fall und öffnet den Dialog, der ihn sendet</translation>
+    </message>
+    <message>
+        <source>The bone is made. Send it in the dialog.</source>
+        <translation>Der Knochen ist fertig. Senden Sie ihn im Dialog.</translation>
+    </message>
+    <message>
+        <source>This bone is painted, so no part of the list is its own.</source>
+        <translation>Dieser Knochen ist gemalt, darum gehört ihm kein Teil der Liste.</translation>
+    </message>
+    <message>
+        <source>Part %1 is chosen in the list.</source>
+        <translation>Teil %1 ist in der Liste gewählt.</translation>
+    </message>
 </context>
 <context>
     <name>ImagingPlane</name>
@@ -1933,6 +1949,10 @@
         <source>S&amp;end a case to a server…</source>
         <translation>Fall an Server s&amp;enden…</translation>
     </message>
+    <message>
+        <source>Another case is being sent. The new one is in %1; send it after that.</source>
+        <translation>Ein anderer Fall wird gerade gesendet. Der neue liegt in %1; senden Sie ihn danach.</translation>
+    </message>
 </context>
 <context>
     <name>OthersShots</name>
@@ -2446,6 +2466,18 @@
         <source>&amp;Close</source>
         <translation>S&amp;chließen</translation>
     </message>
+    <message>
+        <source>Cancelled. The server stored nothing, and the case here stays.</source>
+        <translation>Abgebrochen. Der Server hat nichts gespeichert, und der Fall hier bleibt.</translation>
+    </message>
+    <message>
+        <source>Cancelled. The server stored nothing. Send the case again, or close.</source>
+        <translation>Abgebrochen, der Server hat nichts. Senden Sie noch einmal, oder schließen Sie.</translation>
+    </message>
+    <message>
+        <source>On this computer the case stays only if it is sent.</source>
+        <translation>Auf diesem Computer bleibt der Fall nur, wenn er gesendet wird.</translation>
+    </message>
 </context>
 <context>
     <name>ServerFields</name>
@@ -2595,8 +2627,8 @@
         <translation>Drei Dimensionen</translation>
     </message>
     <message>
-        <source>Left drag: turn. Wheel: nearer. Double click or Enter: the crosshair goes there. Home: all.</source>
-        <translation>Links ziehen: drehen. Rad: näher. Doppelklick, Eingabe: Fadenkreuz. Pos1: alles.</translation>
+        <source>Click: a bone's row. Double click, Enter: crosshair too. Drag: turn. Wheel: nearer. Home: all.</source>
+        <translation>Klick: Zeile. Doppelklick, Eingabe: auch Fadenkreuz. Ziehen: drehen. Pos1: alles.</translation>
     </message>
 </context>
 <context>

@@ -3,7 +3,11 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <memory>
 #include <numbers>
+#include <utility>
+#include <vector>
 
 #include "common/geometry/triangle_mesh.hpp"
 #include "viewer_client/imaging/reduced_scan.hpp"
@@ -15,9 +19,9 @@ const KeepGoing kGoOn = [](double) { return true; };
 constexpr double kLarge_mm = 20.0, kSmall_mm = 9.0;  // radii
 
 // Two balls in oblique voxels that are no cubes: island 1 is the large one, and island 2 the small one.
-class KeptSurface : public testing::Test {
+class KeptBones : public testing::Test {
  protected:
-  KeptSurface() {
+  KeptBones() {
     scan_.dims = {220, 170, 45};
     scan_.origin_mm = {-30.0, 12.0, 5.0};
     scan_.axes_mm =
@@ -38,10 +42,16 @@ class KeptSurface : public testing::Test {
     block_mm_ = blocks.geometry.axes_mm.colwise().norm().maxCoeff();
     EXPECT_EQ(blocks.step, (std::array<int, 3>{2, 2, 1}));
   }
-  [[nodiscard]] Mesh surface() const {
-    auto made = kept_surface(scan_, islands_, kept_, kGoOn);
+  [[nodiscard]] std::vector<KeptSurface> surfaces() const {
+    auto made = kept_surfaces(scan_, islands_, kept_, kGoOn);
     EXPECT_TRUE(made) << made.error().message;
-    return made ? std::move(*made) : Mesh();
+    return made ? std::move(*made) : std::vector<KeptSurface>();
+  }
+  // Of the only bone.
+  [[nodiscard]] Mesh surface() const {
+    auto made = surfaces();
+    EXPECT_LE(made.size(), 1u);
+    return made.empty() ? Mesh() : std::move(made.front().mesh);
   }
   void correct(Correction correction) {
     kept_.corrections.push_back(std::make_shared<const Correction>(std::move(correction)));
@@ -72,14 +82,61 @@ class KeptSurface : public testing::Test {
   double block_mm_ = 0.0;
 };
 
-TEST_F(KeptSurface, ABallLiesWhereItIs) {
+TEST_F(KeptBones, ABallLiesWhereItIs) {
   expect_ball(surface(), large_mm_, kLarge_mm);
   kept_.bones = {};
   kept_.bones[2].set(7);
   expect_ball(surface(), small_mm_, kSmall_mm);
 }
 
-TEST_F(KeptSurface, NothingRemainsOfWhatIsDropped) {
+TEST_F(KeptBones, EachBoneHasItsOwn) {
+  kept_.bones[2].set(7);
+  auto both = surfaces();
+  ASSERT_EQ(both.size(), 2u);
+  EXPECT_EQ(both[0].bone, 1);
+  EXPECT_EQ(both[1].bone, 7);
+  expect_ball(both[0].mesh, large_mm_, kLarge_mm);
+  expect_ball(both[1].mesh, small_mm_, kSmall_mm);
+  // Two bones of one island show as the lowest. Paint within it is the bone that was painted.
+  kept_.bones[1].set(3);
+  correct({CorrectionKind::paint, 9, {large_mm_}, 8.0, Vec3::Zero()});
+  both = surfaces();
+  ASSERT_EQ(both.size(), 3u);
+  EXPECT_EQ(both[0].bone, 1);
+  EXPECT_EQ(both[2].bone, 9);
+  expect_ball(both[2].mesh, large_mm_, 8.0);
+  const auto ball_mm3 = [](double radius_mm) { return 4.0 / 3.0 * std::numbers::pi * std::pow(radius_mm, 3); };
+  EXPECT_NEAR(enclosed_mm3({both[0].mesh.positions_mm, both[0].mesh.triangles, {}}),
+              ball_mm3(kLarge_mm) - ball_mm3(8.0), 0.08 * ball_mm3(kLarge_mm));
+}
+
+// Each point of a surface belongs to the island whose ball it is on, also where it lies beside all voxels of it.
+TEST_F(KeptBones, APointOfItChoosesItsIsland) {
+  kept_.bones[2].set(1);
+  const Mesh both = surface();
+  const TriangleMesh plain{both.positions_mm, both.triangles, {}};
+  for (std::uint32_t vertex = 0; vertex < both.positions_mm.size(); ++vertex) {
+    const Vec3 at_mm = position(plain, vertex);
+    const bool large = (at_mm - large_mm_).norm() < kLarge_mm + block_mm_;
+    ASSERT_EQ(island_near(scan_, islands_, kept_.bones, 1, voxel_near(scan_, at_mm)), large ? 1 : 2);
+  }
+  // Paint far from its bone's islands is of the first one; another bone has none.
+  EXPECT_EQ(island_near(scan_, islands_, kept_.bones, 1, {219, 0, 0}), 1);
+  EXPECT_EQ(island_near(scan_, islands_, kept_.bones, 4, {70, 80, 22}), 0);
+}
+
+TEST(PaintedPoints, AreAtLeastSoFarApart) {
+  const auto stroke = [](CorrectionKind kind, std::vector<Vec3> points) {
+    return std::make_shared<const Correction>(Correction{kind, 1, std::move(points), 2.0, Vec3::Zero()});
+  };
+  const std::vector<SharedCorrection> strokes{
+      stroke(CorrectionKind::paint, {Vec3(0, 0, 0), Vec3(1, 0, 0), Vec3(3, 0, 0), Vec3(3.5, 0, 0), Vec3(6, 0, 0)}),
+      stroke(CorrectionKind::erase, {Vec3(50, 0, 0)}), stroke(CorrectionKind::paint, {Vec3(6.5, 0, 0)})};
+  EXPECT_EQ(painted_points(strokes, 2.0),
+            (std::vector<Vec3>{Vec3(0, 0, 0), Vec3(3, 0, 0), Vec3(6, 0, 0), Vec3(6.5, 0, 0)}));
+}
+
+TEST_F(KeptBones, NothingRemainsOfWhatIsDropped) {
   EXPECT_FALSE(surface().triangles.empty());
   const KeptParts before = kept_;
   // No seed, an eraser over all, a cut beside the ball, and a box beside it.
@@ -97,7 +154,7 @@ TEST_F(KeptSurface, NothingRemainsOfWhatIsDropped) {
   EXPECT_TRUE(surface().triangles.empty());
 }
 
-TEST_F(KeptSurface, ACutLeavesItsSide) {
+TEST_F(KeptBones, ACutLeavesItsSide) {
   const Vec3 along = scan_.axes_mm.col(0).normalized();
   correct({CorrectionKind::cut, 1, {large_mm_}, 0.0, along});
   const Mesh half = surface();
@@ -109,7 +166,7 @@ TEST_F(KeptSurface, ACutLeavesItsSide) {
 }
 
 // A cut of another bone changes nothing, and paint needs no island. The box bounds it.
-TEST_F(KeptSurface, PaintIsKeptWithinTheBox) {
+TEST_F(KeptBones, PaintIsKeptWithinTheBox) {
   correct({CorrectionKind::cut, 3, {large_mm_}, 0.0, Vec3::UnitX()});
   expect_ball(surface(), large_mm_, kLarge_mm);
   kept_.bones = {};
@@ -125,9 +182,9 @@ TEST_F(KeptSurface, PaintIsKeptWithinTheBox) {
     ASSERT_LT((position(plain, vertex) - beside).dot(along), block_mm_);
 }
 
-TEST_F(KeptSurface, ACancelledOneGivesNone) {
+TEST_F(KeptBones, ACancelledOneGivesNone) {
   int asked = 0;
-  const auto stopped = kept_surface(scan_, islands_, kept_, [&](double) { return ++asked < 20; });
+  const auto stopped = kept_surfaces(scan_, islands_, kept_, [&](double) { return ++asked < 20; });
   ASSERT_FALSE(stopped);
   EXPECT_EQ(stopped.error().code, ErrorCode::cancelled);
   EXPECT_EQ(asked, 20) << "it goes on after it was stopped";
@@ -146,8 +203,9 @@ TEST(KeptSurfaceOfACutBone, ChoosesVoxelsOfTheScan) {
   KeptParts kept;
   kept.bones[1].set(1);
   ASSERT_EQ(blocks_of(scan).step, (std::array<int, 3>{2, 2, 2}));
-  const auto rod = kept_surface(scan, *IslandMap::make(scan, std::move(numbers)), kept, kGoOn);
-  ASSERT_TRUE(rod);
+  const auto made = kept_surfaces(scan, *IslandMap::make(scan, std::move(numbers)), kept, kGoOn);
+  ASSERT_TRUE(made && made->size() == 1);
+  const Mesh* rod = &made->front().mesh;
   const TriangleMesh plain{rod->positions_mm, rod->triangles, {}};
   int beyond = 0;
   for (std::uint32_t vertex = 0; vertex < rod->positions_mm.size(); ++vertex) {
@@ -176,8 +234,9 @@ TEST(KeptSurfaceOfThinBone, IsNotLost) {
   KeptParts kept;
   kept.bones[1].set(1);
   ASSERT_EQ(blocks_of(scan).step, (std::array<int, 3>{4, 4, 4}));
-  const auto wall = kept_surface(scan, *IslandMap::make(scan, std::move(numbers)), kept, kGoOn);
-  ASSERT_TRUE(wall);
+  const auto made = kept_surfaces(scan, *IslandMap::make(scan, std::move(numbers)), kept, kGoOn);
+  ASSERT_TRUE(made && made->size() == 1);
+  const Mesh* wall = &made->front().mesh;
   const Box box = bounds({wall->positions_mm, wall->triangles, {}});
   EXPECT_NEAR(box.min_mm.x(), 20.0, 2.0);
   EXPECT_NEAR(box.max_mm.x(), 300.0, 2.0);

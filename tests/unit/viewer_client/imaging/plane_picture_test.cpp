@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <tuple>
+#include <vector>
 
 namespace osteon {
 namespace {
@@ -62,6 +63,26 @@ TEST(PlanePicture, NeighboursInTheListHaveOtherColours) {
     EXPECT_EQ(std::tie(a.red, a.green, a.blue), std::tie(left_out.red, left_out.green, left_out.blue));
     EXPECT_GT(a.strength, left_out.strength);
   }
+}
+
+// Islands 2 and 3 are one bone, island 4 is of two bones, and island 5 is of none.
+TEST(PlanePicture, ABoneHasOneTintInAllItsIslands) {
+  const auto colour = [](const Tint& tint) { return std::tuple(tint.red, tint.green, tint.blue); };
+  PlaneLook look;
+  look.kept[2].set(6);
+  look.kept[3].set(6);
+  look.kept[4].set(8);
+  look.kept[4].set(9);
+  const std::vector<BoneLabel> labels{{6, "femur", 50, 0.0}, {9, "tibia", 0, 0.0}};
+  set_tints(look, labels);
+  EXPECT_EQ(look.islands[2], look.islands[3]);
+  EXPECT_EQ(look.islands[2], look.bones[6]);
+  EXPECT_EQ(colour(look.bones[6]), colour(tint_of(2, true)));
+  EXPECT_NEAR(opacity_of(look.bones[6]), 0.5, 0.01);
+  EXPECT_EQ(look.islands[4], look.bones[8]) << "the lowest bone is shown";
+  EXPECT_EQ(opacity_of(look.bones[8]), 1.0);
+  EXPECT_EQ(opacity_of(look.bones[9]), 0.0);
+  EXPECT_EQ(look.islands[5], tint_of(5, false));
 }
 
 }  // namespace

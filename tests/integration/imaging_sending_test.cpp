@@ -1,0 +1,112 @@
+// From the kept bone of a CT to a case on a server: the server gets the bone that was chosen, and who cancels leaves
+// nothing.
+#include <gtest/gtest.h>
+
+#include <QDialog>
+#include <QPushButton>
+#include <QTest>
+#include <algorithm>
+#include <csignal>
+#include <filesystem>
+#include <set>
+#include <string>
+
+#include "common/volume/case.hpp"
+#include "tests/integration/imaging_bench.hpp"
+#include "tests/integration/sending_bench.hpp"
+#include "tests/support/content.hpp"
+#include "viewer_client/desktop/library.hpp"
+
+namespace osteon {
+namespace {
+
+class ImagingSendingTest : public test::SendingBench<test::ImagingBench> {
+ protected:
+  void SetUp() override {
+    SendingBench::SetUp();
+    open_two_balls();
+    EXPECT_FALSE(part<QPushButton>("send_bone").isEnabled()) << "no bone is kept";
+    islands().item(1)->setCheckState(Qt::Checked);
+  }
+  [[nodiscard]] bool asks() const {
+    const auto* dialog = window_->findChild<QDialog*>("send_dialog");
+    return dialog != nullptr && dialog->isVisible();
+  }
+  [[nodiscard]] std::string said() const { return label("imaging_words").toStdString(); }
+  void press_send() {
+    ASSERT_TRUE(part<QPushButton>("send_bone").isEnabled());
+    QTest::mouseClick(&part<QPushButton>("send_bone"), Qt::LeftButton);
+  }
+  // Presses the page's button, and waits for the dialog.
+  void make_to_send() {
+    press_send();
+    ASSERT_TRUE(until([&] { return asks(); })) << said();
+    EXPECT_TRUE(at_rest());
+  }
+  void escape() { QTest::keyClick(&part<QDialog>("send_dialog"), Qt::Key_Escape); }
+};
+
+TEST_F(ImagingSendingTest, TheServerGetsTheKeptBone) {
+  const std::set<std::string> before = test::names_in(cases_folder());
+  QTest::keySequence(window_.get(), QKeySequence("Ctrl+Alt+U"));
+  ASSERT_TRUE(until([&] { return asks(); })) << said();
+  // After a refusal the same bone is sent.
+  send("nowhere");
+  ASSERT_TRUE(until([&] { return at_rest(); })) << words();
+  EXPECT_NE(words().find("is not HOST:PORT"), std::string::npos) << words();
+  send(address_);
+  ASSERT_TRUE(until([&] { return at_rest(); })) << words();
+  EXPECT_EQ(words(), address_ + " has the case now.");
+  escape();
+  EXPECT_FALSE(asks());
+
+  // Its case, edit list, and nothing else stay, and the edits of the page.
+  std::set<std::string> after = test::names_in(cases_folder());
+  for (const std::string& name : before) after.erase(name);
+  EXPECT_EQ(after, (std::set<std::string>{"balls", "balls.edits.yaml"}));
+  EXPECT_EQ(islands().item(1)->checkState(), Qt::Checked);
+  EXPECT_TRUE(islands().isVisible());
+  const auto here = Case::load(cases_folder() / "balls");
+  ASSERT_TRUE(here) << here.error().message;
+  EXPECT_NEAR(here->volume_mm3(), test::kBall_mm3, 0.05 * test::kBall_mm3) << "one ball";
+  EXPECT_NE(listed("cases").find(to_hex(here->hash())), std::string::npos);
+}
+
+TEST_F(ImagingSendingTest, WhoCancelsLeavesNothing) {
+  const std::set<std::string> before = test::names_in(cases_folder());
+  press_send();
+  EXPECT_TRUE(part<QPushButton>("imaging_cancel").isVisible());
+  QTest::mouseClick(&part<QPushButton>("imaging_cancel"), Qt::LeftButton);
+  ASSERT_TRUE(until([&] { return !part<QPushButton>("imaging_cancel").isVisible(); }));
+  EXPECT_EQ(said(), "Cancelled. Nothing was written.");
+  EXPECT_FALSE(asks());
+  EXPECT_EQ(test::names_in(cases_folder()), before);
+
+  make_to_send();
+  escape();
+  EXPECT_FALSE(asks());
+  EXPECT_EQ(test::names_in(cases_folder()), before) << "nobody has sent it";
+
+  // The server stands still, so the packed case waits for it.
+  make_to_send();
+  server_->signal(SIGSTOP);
+  send(address_);
+  ASSERT_TRUE(until([&] { return words().starts_with("Connecting"); })) << words();
+  escape();
+  ASSERT_TRUE(until([&] { return at_rest(); })) << words();
+  EXPECT_EQ(words(), "Cancelled. The server stored nothing. Send the case again, or close.");
+  escape();
+  EXPECT_FALSE(asks());
+  EXPECT_TRUE(until([&] { return test::names_in(cases_folder()) == before; }));
+  server_->signal(SIGCONT);
+  EXPECT_TRUE(std::filesystem::is_empty(uploads_.path()));
+
+  // A window that goes takes the case with it.
+  make_to_send();
+  window_.reset();
+  const std::set<std::string> after = test::names_in(cases_folder());
+  EXPECT_TRUE(std::ranges::includes(before, after)) << "its scratch files go, too";
+}
+
+}  // namespace
+}  // namespace osteon
