@@ -1,10 +1,14 @@
 // The page of image processing on the bench of a window, with a scan of two balls.
 #pragma once
+#include <QApplication>
+#include <QFileDialog>
 #include <QSettings>
+#include <QTimer>
 #include <array>
 #include <cmath>
 #include <filesystem>
 #include <string>
+#include <utility>
 
 #include "server/import/dicom_writer.hpp"
 #include "tests/integration/two_balls.hpp"
@@ -13,6 +17,25 @@
 #include "viewer_client/desktop/language.hpp"
 
 namespace osteon::test {
+
+// Chooses a folder in the next dialog, as two clicks do.
+class FolderChooser : public QObject {
+ public:
+  explicit FolderChooser(QString folder) : folder_(std::move(folder)) {
+    connect(&timer_, &QTimer::timeout, this, [this] {
+      auto* dialog = qobject_cast<QFileDialog*>(QApplication::activeModalWidget());
+      if (dialog == nullptr) return;
+      timer_.stop();
+      dialog->selectFile(folder_);
+      QMetaObject::invokeMethod(dialog, "accept", Qt::QueuedConnection);
+    });
+    timer_.start(20);
+  }
+
+ private:
+  QString folder_;
+  QTimer timer_;
+};
 
 class ImagingBench : public WindowBench {
  protected:

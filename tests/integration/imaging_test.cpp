@@ -5,7 +5,6 @@
 #include <QApplication>
 #include <QComboBox>
 #include <QDockWidget>
-#include <QFileDialog>
 #include <QLabel>
 #include <QListWidget>
 #include <QPushButton>
@@ -13,7 +12,6 @@
 #include <QSlider>
 #include <QSpinBox>
 #include <QTest>
-#include <QTimer>
 #include <QWheelEvent>
 #include <algorithm>
 #include <array>
@@ -35,6 +33,7 @@ namespace {
 namespace fs = std::filesystem;
 using namespace std::chrono_literals;
 using test::children;
+using test::FolderChooser;
 using test::two_balls;
 
 class ImagingTest : public test::ImagingBench {
@@ -79,25 +78,6 @@ class ImagingTest : public test::ImagingBench {
     return words();
   }
   int clicks_ = 0;
-};
-
-// Chooses a folder in the next dialog, as two clicks do.
-class FolderChooser : public QObject {
- public:
-  explicit FolderChooser(QString folder) : folder_(std::move(folder)) {
-    connect(&timer_, &QTimer::timeout, this, [this] {
-      auto* dialog = qobject_cast<QFileDialog*>(QApplication::activeModalWidget());
-      if (dialog == nullptr) return;
-      timer_.stop();
-      dialog->selectFile(folder_);
-      QMetaObject::invokeMethod(dialog, "accept", Qt::QueuedConnection);
-    });
-    timer_.start(20);
-  }
-
- private:
-  QString folder_;
-  QTimer timer_;
 };
 
 TEST_F(ImagingTest, FromAFolderToADrillableBoneInTenClicks) {

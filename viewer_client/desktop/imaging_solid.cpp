@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <atomic>
 #include <utility>
+#include <vector>
 
 #include "viewer_client/imaging/reduced_scan.hpp"
 
@@ -120,6 +121,7 @@ KeptParts ImagingSolid::kept() const { return {scene_.look.kept, scene_.look.cor
 void ImagingSolid::refresh() {
   if (!scene_.open()) return;
   show_cross();
+  show_boxes();
   show_state();
   // With a threshold of the look, the islands are those of another one. Their surface stays until they are found.
   // What was wanted before is asked for again then.
@@ -190,6 +192,19 @@ void ImagingSolid::show_cross() {
   cross_ = scene_.crosshair;
   view_->scene().show_cross(grid_of(scene_.scan.geometry), scene_.crosshair);
   view_->redraw(true);
+}
+
+void ImagingSolid::show_boxes() {
+  const int chosen = scene_.boxes ? scene_.boxes->section_at(scene_.crosshair) : -1;
+  if (boxes_ == scene_.boxes && chosen_ == chosen) return;
+  boxes_ = scene_.boxes;
+  chosen_ = chosen;
+  std::vector<WireBox> wires;
+  if (boxes_)
+    for (const DrawnBox& box : drawn_boxes(*boxes_, chosen))
+      wires.push_back({box.first, box.last, box.colour, box.wide, box.dashed});
+  view_->scene().show_boxes(grid_of(scene_.scan.geometry), wires);
+  view_->redraw();
 }
 
 void ImagingSolid::show_state() {

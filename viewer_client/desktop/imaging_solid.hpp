@@ -56,6 +56,7 @@ class ImagingSolid : public QWidget {
   void make(std::unique_ptr<Job> job);
   void take(Job& done);
   void show_cross();
+  void show_boxes();
   // Which picture there is, and what it says.
   void show_state();
 
@@ -63,6 +64,8 @@ class ImagingSolid : public QWidget {
   std::function<void(const std::array<int, 3>& voxel)> look_at_;
   std::optional<KeptParts> wanted_, shown_;  // `shown_`: nothing if islands or scan have changed since
   std::optional<std::array<int, 3>> cross_;  // the crosshair of the picture
+  std::shared_ptr<const KeptBoxes> boxes_;   // of the picture
+  int chosen_ = -1;                          // section of them
   bool has_surface_ = false, has_soft_ = false;
   QString problem_;  // why there is no surface
   QString notice_;   // in the picture

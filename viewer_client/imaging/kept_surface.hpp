@@ -1,22 +1,12 @@
 // The surface of what is kept of a scan, as far as it is known before osteon-import makes the bone.
 #pragma once
 #include <array>
-#include <optional>
-#include <vector>
 
 #include "common/core/keep_going.hpp"
 #include "common/surface/mesh_block.hpp"
-#include "viewer_client/imaging/corrected_plane.hpp"
+#include "viewer_client/imaging/kept_slices.hpp"
 
 namespace osteon {
-
-// What decides whether a voxel is kept, besides the islands.
-struct KeptParts {
-  BonesOfIslands bones{};
-  std::vector<SharedCorrection> corrections;  // in their order
-  std::optional<MarkedBox> box;
-  friend bool operator==(const KeptParts&, const KeptParts&) = default;
-};
 
 // The surface of the voxels that the planes show as kept (corrected_plane()), within the box, at the resolution of
 // reduced_scan(). A block is solid if a quarter of it is kept, so that thin bone is not lost. Closed, bone frame, mm,
