@@ -51,13 +51,15 @@ Result<SubVolumeInput> read_input(const SubVolumeArguments& a, const KeepGoing& 
   }
   const double threshold_hu = a.threshold_hu.value_or(imaging::kBoneThreshold_hu);
   if (is_meta_file(a.scan.input)) return input_of_files(a.scan.input, threshold_hu, reading);
+  if (!a.bone.empty()) {
+    const auto marks = read_label_map(a.bone, part(reading, 0.0, 0.4));
+    if (!marks) return tl::unexpected(marks.error());
+    auto marked = read_scan(a.scan, part(reading, 0.4, 0.9));
+    if (!marked) return tl::unexpected(marked.error());
+    return input_of_marked(std::move(*marked), *marks, threshold_hu, part(reading, 0.9, 1.0));
+  }
   auto scan = read_scan(a.scan, part(reading, 0.0, 0.5));
   if (!scan) return tl::unexpected(scan.error());
-  if (!a.bone.empty()) {
-    const auto marks = read_label_map(a.bone, part(reading, 0.5, 0.9));
-    if (!marks) return tl::unexpected(marks.error());
-    return input_of_marked(std::move(*scan), *marks, threshold_hu, part(reading, 0.9, 1.0));
-  }
   auto input = input_of_scan(std::move(*scan), threshold_hu, part(reading, 0.5, 1.0));
   if (!input && input.error().code == ErrorCode::invalid_input)
     return bad_input(a.scan.input + ": " + input.error().message);

@@ -1,6 +1,7 @@
 // The sub-volumes of the page of image processing.
 #include <QHideEvent>
 #include <QPushButton>
+#include <QShortcut>
 #include <utility>
 
 #include "viewer_client/desktop/imaging_page.hpp"
@@ -17,6 +18,9 @@ QPushButton* ImagingPage::make_boxes_button() {
        [this](const std::array<int, 3>& voxel) { look_at(voxel); },
        [this](const std::filesystem::path& folder, int subdivisions) { write_boxes(folder, subdivisions); }},
       this);
+  // The keys of the page's window do not reach the dialog.
+  for (QPushButton* of : {undo_, redo_})
+    connect(new QShortcut(of->shortcut(), boxes_), &QShortcut::activated, of, &QPushButton::click);
   auto* button = new QPushButton(tr("Sub-volumes…"));
   button->setObjectName("open_sub_volumes");
   button->setShortcut(QKeySequence("Ctrl+Alt+B"));
