@@ -79,17 +79,22 @@ class ImagingBoxesTest : public test::ImagingBench {
     }
     return Qt::black;
   }
-  // Pixels of the colour of a chosen section in three dimensions.
-  [[nodiscard]] int orange_pixels() const {
+  // The chosen section in three dimensions: how many pixels have its colour, and the highest of their rows.
+  struct Orange {
+    int pixels = 0, top = 0;
+  };
+  [[nodiscard]] Orange orange() const {
     auto* solid = dynamic_cast<ImagingSolid*>(window_->findChild<QWidget*>("solid"));
     const Image image = solid->view().scene().image();
-    int count = 0;
+    Orange seen;
     for (int y = 0; y < image.height_px; ++y)
       for (int x = 0; x < image.width_px; ++x) {
         const auto c = image.at(x, y);
-        if (c[0] > 210 && c[1] > 140 && c[1] < 180 && c[2] < 30) ++count;
+        if (c[0] <= 210 || c[1] <= 140 || c[1] >= 180 || c[2] >= 30) continue;
+        if (seen.pixels == 0) seen.top = y;
+        ++seen.pixels;
       }
-    return count;
+    return seen;
   }
   void write(const fs::path& to) {
     const test::FolderChooser chooser(QString::fromStdString(to.string()));
@@ -124,12 +129,15 @@ TEST_F(ImagingBoxesTest, AreThoseOfAKnownBoneAndFollowIt) {
   ASSERT_EQ(sections().count(), 2);
   EXPECT_EQ(sections().currentRow(), 0);
   EXPECT_EQ(line_between({27, 20, 4}, {28, 20, 4}), kOrange);
+  ASSERT_TRUE(until([&] { return orange().pixels > 40; }));
+  const int top_of_foot = orange().top;
   QTest::mouseClick(sections().viewport(), Qt::LeftButton, {}, sections().visualItemRect(sections().item(1)).center());
   EXPECT_EQ(sections().currentRow(), 1);
   EXPECT_TRUE(kShaftOfBone.contains({sagittal.slice(), coronal.slice(), axial.slice()}));
   EXPECT_EQ(line_between({13, 10, 14}, {14, 10, 14}), kOrange);
   EXPECT_EQ(line_between({27, 20, 14}, {28, 20, 14}), QColor(Qt::black)) << "a box of other slices";
-  EXPECT_TRUE(until([&] { return orange_pixels() > 40; })) << orange_pixels();
+  // The shaft is above the foot.
+  EXPECT_TRUE(until([&] { return orange().pixels > 40 && orange().top < top_of_foot - 40; })) << orange().top;
   keep_picture("boxes_shaft");
   sections().setFocus();
   QTest::keyClick(&sections(), Qt::Key_Up);
@@ -138,7 +146,7 @@ TEST_F(ImagingBoxesTest, AreThoseOfAKnownBoneAndFollowIt) {
   QTest::mouseClick(&axial, Qt::LeftButton, {}, axial.pixel({35, 31, axial.slice()}));
   EXPECT_EQ(sections().currentRow(), -1);
   EXPECT_EQ(line_between({27, 20, 4}, {28, 20, 4}), kBlue);
-  EXPECT_TRUE(until([&] { return orange_pixels() == 0; })) << orange_pixels();
+  EXPECT_TRUE(until([&] { return orange().pixels == 0; })) << orange().pixels;
   QTest::mouseClick(&axial, Qt::LeftButton, {}, axial.pixel({10, 20, axial.slice()}));
   EXPECT_EQ(sections().currentRow(), 0);
 
@@ -154,7 +162,7 @@ TEST_F(ImagingBoxesTest, AreThoseOfAKnownBoneAndFollowIt) {
   part<QSlider>("slice_axial").setValue(4);
   part<QDialog>("sub_volumes").close();
   EXPECT_EQ(line_between({27, 20, 4}, {28, 20, 4}), QColor(Qt::black));
-  EXPECT_TRUE(until([&] { return orange_pixels() == 0; })) << orange_pixels();
+  EXPECT_TRUE(until([&] { return orange().pixels == 0; })) << orange().pixels;
 }
 
 TEST_F(ImagingBoxesTest, TheFilesAreThoseOfTheImporter) {

@@ -23,6 +23,7 @@ namespace osteon {
 namespace {
 
 constexpr int kBoxesPause_ms = 150;  // a drag is many edits
+constexpr QSize kFirstSize{440, 420};
 
 QString count_text(std::int64_t count) { return QLocale().toString(static_cast<qlonglong>(count)); }
 
@@ -95,6 +96,7 @@ ImagingBoxes::ImagingBoxes(const ImagingScene& scene, Events events, QWidget* pa
   all->addWidget(list_, 1);
   all->addWidget(lines);
   all->addWidget(buttons);
+  resize(kFirstSize);
   pause_.setSingleShot(true);
   pause_.setInterval(kBoxesPause_ms);
   connect(&pause_, &QTimer::timeout, this, [this] { ask(); });
