@@ -26,7 +26,7 @@ class FolderChooser : public QObject {
       auto* dialog = qobject_cast<QFileDialog*>(QApplication::activeModalWidget());
       if (dialog == nullptr) return;
       timer_.stop();
-      dialog->selectFile(folder_);
+      dialog->setDirectory(folder_);  // selectFile() does nothing while the line of the name has the focus
       QMetaObject::invokeMethod(dialog, "accept", Qt::QueuedConnection);
     });
     timer_.start(20);
