@@ -16,7 +16,7 @@ namespace {
 
 struct SubVolumeArguments {
   ScanArguments scan;
-  std::string source, out, script;
+  std::string source, bone, out, script;
   std::optional<double> threshold_hu;
   int subdivisions = MeasureOptions{}.subdivisions;
   double cut_mm = MeasureOptions{}.cut_mm;
@@ -34,6 +34,8 @@ Result<SubVolumeInput> read_input(const SubVolumeArguments& a, const KeepGoing& 
     return bad_input("--source is for a case; leave it out, because " + a.scan.input + " is none");
   if ((is_case(a.scan.input) || is_meta_file(a.scan.input)) && has_scan_options(a.scan) && !of_source)
     return bad_input(a.scan.input + " says itself how it is to be read; leave out the options for scans");
+  if (!a.bone.empty() && (is_case(a.scan.input) || is_meta_file(a.scan.input)))
+    return bad_input("--bone is for a scan; leave it out, because " + a.scan.input + " says itself what is bone");
   if (is_case(a.scan.input)) {
     if (a.threshold_hu)
       return bad_input("--threshold is for a scan; leave it out, because the case " + a.scan.input +
@@ -49,6 +51,13 @@ Result<SubVolumeInput> read_input(const SubVolumeArguments& a, const KeepGoing& 
   }
   const double threshold_hu = a.threshold_hu.value_or(imaging::kBoneThreshold_hu);
   if (is_meta_file(a.scan.input)) return input_of_files(a.scan.input, threshold_hu, reading);
+  if (!a.bone.empty()) {
+    const auto marks = read_label_map(a.bone, part(reading, 0.0, 0.4));
+    if (!marks) return tl::unexpected(marks.error());
+    auto marked = read_scan(a.scan, part(reading, 0.4, 0.9));
+    if (!marked) return tl::unexpected(marked.error());
+    return input_of_marked(std::move(*marked), *marks, threshold_hu, part(reading, 0.9, 1.0));
+  }
   auto scan = read_scan(a.scan, part(reading, 0.0, 0.5));
   if (!scan) return tl::unexpected(scan.error());
   auto input = input_of_scan(std::move(*scan), threshold_hu, part(reading, 0.5, 1.0));
@@ -96,6 +105,9 @@ void add_subvolume_command(CLI::App& app, std::vector<Command>& commands) {
   add_scan_options(*command, a.scan, "CASE_DIR|INPUT");
   command->add_option("--source", a.source,
                       "Of a case: the scan from which it was imported. Then the original data are the whole scan");
+  command->add_option("--bone", a.bone,
+                      "Of a scan: a label map on its voxels. What has a number there is bone, instead of the largest "
+                      "island at or above the threshold");
   command->add_option("--out", a.out,
                       "Folder, made by this command: tables (report.txt, report.json), the boxes on the bone "
                       "(boxes.png), and the files of the sub-volumes (Meta.dat, SBB1.dat ...)");

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "common/imaging/calibration.hpp"
+#include "common/imaging/components.hpp"
 #include "common/imaging/island_kinds.hpp"
 #include "common/imaging/segmentation.hpp"
 #include "common/subvolumes/bounding_boxes.hpp"
@@ -73,6 +74,10 @@ Result<PlacedFiles> place_files(const std::vector<subvolumes::SubVolumeData>& fi
   }
   for (std::size_t axis = 0; axis < 3; ++axis) placed.dims[axis] = static_cast<int>(dims[axis]);
   return placed;
+}
+
+ScanGeometry scan_geometry_of(const imaging::HuVolume& volume) {
+  return {volume.dims, volume.origin_mm, volume.directions * volume.spacing_mm.asDiagonal()};
 }
 
 // The part of a volume within the region.
@@ -210,6 +215,28 @@ Result<SubVolumeInput> input_of_scan(CtScan scan, double threshold_hu, const Kee
                   input.bone.begin() + static_cast<std::ptrdiff_t>(volume.index(region.first[0], region.first[1] + row,
                                                                                 region.first[2] + slice)));
   return input;
+}
+
+Result<SubVolumeInput> input_of_marked(CtScan scan, const LabelMap& marks, double threshold_hu,
+                                       const KeepGoing& keep_going) {
+  imaging::HuVolume& volume = scan.volume;
+  const ScanGeometry of_scan = scan_geometry_of(volume), of_marks = scan_geometry_of(marks.grid);
+  const Vec3 last(volume.dims[0] - 1, volume.dims[1] - 1, volume.dims[2] - 1);
+  const double apart_mm =
+      (of_scan.origin_mm - of_marks.origin_mm).norm() + (of_scan.axes_mm - of_marks.axes_mm).colwise().norm().dot(last);
+  if (of_scan.dims != of_marks.dims || !(apart_mm <= kOffVoxel * volume.spacing_mm.minCoeff()))
+    return bad_input("the voxels of " + marks.file +
+                     " are not those of the scan; give --bone a file with a number for each voxel of this scan");
+  imaging::VoxelMask bone(volume.dims);
+  for (const LabelSegment& segment : marks.segments) {
+    if (!keep_going(0.0)) return stopped_while("reading the bone");
+    for (const imaging::VoxelRun& run : segment.runs) imaging::fill_run(bone, run, 1);
+  }
+  return SubVolumeInput{.geometry = of_scan,
+                        .hu = std::move(volume.values),
+                        .bone = std::move(bone.values),
+                        .threshold_hu = threshold_hu,
+                        .what = scan.source + ", bone of a label map"};
 }
 
 }  // namespace osteon::import

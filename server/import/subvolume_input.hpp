@@ -8,6 +8,7 @@
 
 #include "common/subvolumes/bone_voxels.hpp"
 #include "server/import/ct_scan.hpp"
+#include "server/import/label_map.hpp"
 
 namespace osteon::import {
 
@@ -46,5 +47,10 @@ struct SubVolumeInput {
 // out those that part bone from tables, casts and contrast medium that touch it. Errors: invalid_input (no bone),
 // cancelled.
 [[nodiscard]] Result<SubVolumeInput> input_of_scan(CtScan scan, double threshold_hu, const KeepGoing& keep_going);
+
+// The whole scan. Bone is what has any number in a label map on the same voxels, such as one of the window. Errors:
+// invalid_input (other voxels; no bone), cancelled.
+[[nodiscard]] Result<SubVolumeInput> input_of_marked(CtScan scan, const LabelMap& marks, double threshold_hu,
+                                                     const KeepGoing& keep_going);
 
 }  // namespace osteon::import

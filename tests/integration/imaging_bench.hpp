@@ -1,12 +1,16 @@
 // The page of image processing on the bench of a window, with a scan of two balls.
 #pragma once
+#include <QApplication>
+#include <QFileDialog>
 #include <QListWidget>
 #include <QSettings>
 #include <QSlider>
+#include <QTimer>
 #include <array>
 #include <cmath>
 #include <filesystem>
 #include <string>
+#include <utility>
 
 #include "server/import/dicom_writer.hpp"
 #include "tests/integration/two_balls.hpp"
@@ -15,6 +19,25 @@
 #include "viewer_client/desktop/language.hpp"
 
 namespace osteon::test {
+
+// Chooses a folder in the next dialog, as two clicks do.
+class FolderChooser : public QObject {
+ public:
+  explicit FolderChooser(QString folder) : folder_(std::move(folder)) {
+    connect(&timer_, &QTimer::timeout, this, [this] {
+      auto* dialog = qobject_cast<QFileDialog*>(QApplication::activeModalWidget());
+      if (dialog == nullptr) return;
+      timer_.stop();
+      dialog->setDirectory(folder_);  // selectFile() does nothing while the line of the name has the focus
+      QMetaObject::invokeMethod(dialog, "accept", Qt::QueuedConnection);
+    });
+    timer_.start(20);
+  }
+
+ private:
+  QString folder_;
+  QTimer timer_;
+};
 
 class ImagingBench : public WindowBench {
  protected:

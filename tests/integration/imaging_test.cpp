@@ -6,7 +6,6 @@
 #include <QComboBox>
 #include <QCoreApplication>
 #include <QDockWidget>
-#include <QFileDialog>
 #include <QLabel>
 #include <QListWidget>
 #include <QPushButton>
@@ -14,7 +13,6 @@
 #include <QSlider>
 #include <QSpinBox>
 #include <QTest>
-#include <QTimer>
 #include <QWheelEvent>
 #include <algorithm>
 #include <array>
@@ -37,6 +35,7 @@ namespace {
 namespace fs = std::filesystem;
 using namespace std::chrono_literals;
 using test::children;
+using test::FolderChooser;
 using test::kBall_hu;
 using test::kMuscle_hu;
 using test::two_balls;
@@ -88,25 +87,6 @@ class ImagingTest : public test::ImagingBench {
 fs::path scratch() {
   return cases_folder() / (".partial-imaging-" + std::to_string(QCoreApplication::applicationPid()));
 }
-
-// Chooses a folder in the next dialog, as two clicks do.
-class FolderChooser : public QObject {
- public:
-  explicit FolderChooser(QString folder) : folder_(std::move(folder)) {
-    connect(&timer_, &QTimer::timeout, this, [this] {
-      auto* dialog = qobject_cast<QFileDialog*>(QApplication::activeModalWidget());
-      if (dialog == nullptr) return;
-      timer_.stop();
-      dialog->selectFile(folder_);
-      QMetaObject::invokeMethod(dialog, "accept", Qt::QueuedConnection);
-    });
-    timer_.start(20);
-  }
-
- private:
-  QString folder_;
-  QTimer timer_;
-};
 
 TEST_F(ImagingTest, FromAFolderToADrillableBoneInTenClicks) {
   const fs::path folder = series("ct", two_balls());

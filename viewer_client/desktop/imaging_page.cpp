@@ -19,6 +19,7 @@
 #include <utility>
 
 #include "viewer_client/desktop/enabled.hpp"
+#include "viewer_client/desktop/library.hpp"
 
 namespace osteon {
 
@@ -95,6 +96,9 @@ ImagingSteps::Events ImagingPage::step_events() {
           [this](ShownScan scan, const HuHistogram& histogram) { show_filtered(std::move(scan), histogram); },
           [this](std::vector<ListedIsland> list, IslandMap map) { show_islands(std::move(list), std::move(map)); },
           [this](VoxelFile<std::uint8_t> edges) { show_edges(std::move(edges)); },
+          [this](const std::filesystem::path& folder) {
+            end_work(tr("The root sub-volumes are in %1.").arg(text_of(folder)));
+          },
           [this](const std::filesystem::path& bone) { use_made(bone); },
           [this](const QString& sentence) {
             events_.busy(false);
@@ -261,6 +265,8 @@ QBoxLayout* ImagingPage::make_side() {
     follow_edits();
   });
   redo_->setShortcut(QKeySequence::Redo);
+  open_boxes_ = make_boxes_button();
+  column->addWidget(open_boxes_);
   report_ = make_report_choice();
   column->addWidget(report_);
   make_ = add_button(*column, tr("&Make the bone"), "make_bone",
@@ -291,7 +297,7 @@ void ImagingPage::open_source(const QString& source) {
   }
   threshold_timer_.stop();
   wants_islands_ = false;
-  solid_->release();
+  release_scene();
   scene_.scan = {};
   scene_.first = {};
   scene_.islands = {};
@@ -307,6 +313,7 @@ void ImagingPage::open_source(const QString& source) {
   scene_.look = {};
   scene_.seeds.clear();
   scene_.landmarks.clear();
+  boxes_->hide();
   tools_->reset();
   choice_->follow({});
   landmarks_->follow({});
@@ -375,7 +382,7 @@ void ImagingPage::forget_first() {
 }
 
 void ImagingPage::show_scan(ShownScan scan, const HuHistogram& histogram) {
-  solid_->release();
+  release_scene();
   scene_.scan = std::move(scan);
   scene_.first = {};
   histogram_->set_histogram(histogram);
@@ -396,7 +403,7 @@ void ImagingPage::begin_planes() {
 }
 
 void ImagingPage::show_filtered(ShownScan scan, const HuHistogram& histogram) {
-  solid_->release();
+  release_scene();
   show_edges({});  // they were of the scan before
   scene_.scan = std::move(scan);
   shown_filter_ = searched_.filter;
@@ -424,7 +431,7 @@ void ImagingPage::find_islands() {
 
 void ImagingPage::show_islands(std::vector<ListedIsland> list, IslandMap map) {
   islands_ = std::move(list);
-  solid_->release();
+  release_scene();
   scene_.islands = std::move(map);
   const bool first = !found_;
   found_ = searched_;
@@ -505,6 +512,7 @@ void ImagingPage::refresh_planes() {
   for (ImagingPlane* plane : planes_)
     if (plane != nullptr) plane->refresh();
   if (solid_ != nullptr) solid_->refresh();
+  if (boxes_ != nullptr) boxes_->refresh();
 }
 
 void ImagingPage::enable_parts() {
@@ -529,6 +537,8 @@ void ImagingPage::enable_parts() {
   // After a search that was cancelled or failed.
   find_->setVisible(free && !changing && scene_.open() && !current());
   set_enabled(*keep_, found, none);
+  set_enabled(*open_boxes_, found, none);
+  boxes_->allow(found, none);
   set_enabled(*island_list_, found, none);
   set_enabled(*undo_, !making && (changing || history_.can_undo()), making ? wait : tr("There is nothing to undo."));
   set_enabled(*redo_, !making && history_.can_redo(), making ? wait : tr("There is nothing to redo."));

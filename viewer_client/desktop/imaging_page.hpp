@@ -11,6 +11,7 @@
 #include <optional>
 #include <vector>
 
+#include "viewer_client/desktop/imaging_boxes.hpp"
 #include "viewer_client/desktop/imaging_histogram.hpp"
 #include "viewer_client/desktop/imaging_landmarks.hpp"
 #include "viewer_client/desktop/imaging_plane.hpp"
@@ -49,14 +50,22 @@ class ImagingPage : public QWidget {
   };
   explicit ImagingPage(Events events, QWidget* parent = nullptr);
   // The scene goes before the widgets that show it.
-  ~ImagingPage() override { solid_->release(); }
+  ~ImagingPage() override { release_scene(); }
 
   // A folder, zip, ISO image or file. What is open goes.
   void open_source(const QString& source);
   [[nodiscard]] bool making() const { return steps_.making(); }
   void cancel() { steps_.cancel(); }
 
+ protected:
+  void hideEvent(QHideEvent* event) override;
+
  private:
+  // Before the scan or the islands of the scene change.
+  void release_scene() {
+    solid_->release();
+    boxes_->release();
+  }
   [[nodiscard]] ImagingSteps::Events step_events();
   QBoxLayout* make_head();
   QBoxLayout* make_work();
@@ -140,6 +149,8 @@ class ImagingPage : public QWidget {
   void refresh_look();
   void refresh_planes();
   void enable_parts();
+  [[nodiscard]] QPushButton* make_boxes_button();
+  void write_boxes(const std::filesystem::path& folder, int subdivisions);
 
   Events events_;
   ImagingScene scene_;
@@ -174,7 +185,7 @@ class ImagingPage : public QWidget {
   QListWidget *series_list_, *island_list_;
   QLabel *words_, *readout_;
   QProgressBar* progress_;
-  QPushButton *cancel_, *back_, *find_, *keep_, *undo_, *redo_, *make_, *send_;
+  QPushButton *cancel_, *back_, *find_, *keep_, *undo_, *redo_, *open_boxes_, *make_, *send_;
   QComboBox *preset_, *filter_;
   QCheckBox *edges_, *report_;
   QSpinBox* threshold_;
@@ -185,6 +196,7 @@ class ImagingPage : public QWidget {
   ImagingHistogram* histogram_;
   std::array<ImagingPlane*, 3> planes_{};
   ImagingSolid* solid_ = nullptr;
+  ImagingBoxes* boxes_ = nullptr;
   QTimer threshold_timer_;  // the user has stopped to change the threshold
 };
 

@@ -21,6 +21,7 @@ constexpr int kWheelStep = 120;  // of Qt, for one notch
 constexpr QColor kCrosshair{90, 230, 140, 170}, kLetter{250, 220, 120}, kBoxEdge{90, 200, 255}, kOutside{255, 60, 60};
 constexpr QColor kBrush{255, 255, 255, 200};
 constexpr QColor kLandmark{255, 120, 230};
+constexpr double kWideBox_px = 3.0;
 constexpr double kSeedMark_px = 4.0, kLandmark_px = 4.0;
 
 const char* name_of(Plane plane) {
@@ -113,6 +114,7 @@ void ImagingPlane::paintEvent(QPaintEvent* /*event*/) {
   const QRectF picture(at.left_px, at.top_px, at.width_px, at.height_px);
   painter.setRenderHint(QPainter::SmoothPixmapTransform);
   painter.drawImage(picture, image);
+  paint_boxes(painter, at);
   paint_marks(painter, at);
   paint_landmarks(painter, at);
   // Below the title, which may reach the middle.
@@ -137,12 +139,8 @@ void ImagingPlane::paint_marks(QPainter& painter, const PlaneFrame& at) const {
   const double voxel_px = at.width_px / axes_.columns;
   if (scene_.look.box) {
     const VoxelRange range = range_of(scene_.scan.geometry, scene_.look.box);
-    const auto first = place_in(axes_, range.first), last = place_in(axes_, range.last);
-    const auto a = pixel_of(axes_, at, std::min(first[0], last[0]), std::min(first[1], last[1]));
-    const auto b = pixel_of(axes_, at, std::max(first[0], last[0]), std::max(first[1], last[1]));
-    const double half_px = 0.5 * voxel_px, half_row_px = 0.5 * at.height_px / axes_.rows;
     painter.setPen(kBoxEdge);
-    painter.drawRect(QRectF(QPointF(a[0] - half_px, a[1] - half_row_px), QPointF(b[0] + half_px, b[1] + half_row_px)));
+    painter.drawRect(rectangle(at, range.first, range.last));
   }
   for (const ImagingScene::SeedMark& seed : scene_.seeds) {
     const auto place = place_in(axes_, seed.voxel);
@@ -161,6 +159,26 @@ void ImagingPlane::paint_marks(QPainter& painter, const PlaneFrame& at) const {
   const double radius_px = scene_.brush_mm / axes_.right_mm * voxel_px;
   painter.setPen(kBrush);
   painter.drawEllipse(QPointF(*hovered_), radius_px, radius_px);
+}
+
+QRectF ImagingPlane::rectangle(const PlaneFrame& at, const std::array<int, 3>& first,
+                               const std::array<int, 3>& last) const {
+  const auto from = place_in(axes_, first), to = place_in(axes_, last);
+  const auto a = pixel_of(axes_, at, std::min(from[0], to[0]), std::min(from[1], to[1]));
+  const auto b = pixel_of(axes_, at, std::max(from[0], to[0]), std::max(from[1], to[1]));
+  const double half_px = 0.5 * at.width_px / axes_.columns, half_row_px = 0.5 * at.height_px / axes_.rows;
+  return {QPointF(a[0] - half_px, a[1] - half_row_px), QPointF(b[0] + half_px, b[1] + half_row_px)};
+}
+
+void ImagingPlane::paint_boxes(QPainter& painter, const PlaneFrame& at) const {
+  if (!scene_.boxes) return;
+  for (const DrawnBox& box : drawn_boxes(*scene_.boxes, scene_.boxes->section_at(scene_.crosshair))) {
+    const int first = place_in(axes_, box.first)[2], last = place_in(axes_, box.last)[2];
+    if (slice() < std::min(first, last) || slice() > std::max(first, last)) continue;
+    painter.setPen(QPen(QColor(box.colour[0], box.colour[1], box.colour[2]), box.wide ? kWideBox_px : 1.0,
+                        box.dashed ? Qt::DashLine : Qt::SolidLine));
+    painter.drawRect(rectangle(at, box.first, box.last));
+  }
 }
 
 void ImagingPlane::paint_landmarks(QPainter& painter, const PlaneFrame& at) const {

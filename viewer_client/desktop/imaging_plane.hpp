@@ -4,13 +4,16 @@
 #include <QWidget>
 #include <array>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <vector>
 
+#include "viewer_client/imaging/kept_boxes.hpp"
 #include "viewer_client/imaging/plane_drag.hpp"
 #include "viewer_client/imaging/plane_picture.hpp"
 
 class QPainter;
+class QRectF;
 class QSlider;
 
 namespace osteon {
@@ -36,6 +39,7 @@ struct ImagingScene {
     QString name;
   };
   std::vector<LandmarkMark> landmarks;
+  std::shared_ptr<const KeptBoxes> boxes;  // of what is kept; nothing: they are not shown
 
   [[nodiscard]] bool open() const { return !scan.values.empty(); }
   [[nodiscard]] bool waits() const { return !open() && !first.values.empty(); }
@@ -99,6 +103,11 @@ class ImagingPlane : public QWidget {
   [[nodiscard]] std::vector<std::uint32_t> draw() const;
   // Crosshair, box, seeds and brush.
   void paint_marks(QPainter& painter, const PlaneFrame& at) const;
+  // The voxels of a box in the widget. Its corners are opposite ones.
+  [[nodiscard]] QRectF rectangle(const PlaneFrame& at, const std::array<int, 3>& first,
+                                 const std::array<int, 3>& last) const;
+  // Sub-volumes that this slice crosses.
+  void paint_boxes(QPainter& painter, const PlaneFrame& at) const;
   // Those in this slice, with their names.
   void paint_landmarks(QPainter& painter, const PlaneFrame& at) const;
 

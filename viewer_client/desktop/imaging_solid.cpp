@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <atomic>
 #include <utility>
+#include <vector>
 
 #include "viewer_client/imaging/reduced_scan.hpp"
 
@@ -129,6 +130,7 @@ void ImagingSolid::refresh() {
   show_cross();
   show_tints();
   show_marks();
+  show_boxes();
   show_state();
   // With a threshold of the look, the islands are those of another one. Their surface stays until they are found.
   // What was wanted before is asked for again then.
@@ -233,6 +235,19 @@ void ImagingSolid::show_marks(bool all) {
     view_->scene().marks().show(static_cast<SolidMark>(kind), marks_[kind], mark_mm_);
     view_->redraw();
   }
+}
+
+void ImagingSolid::show_boxes() {
+  const int chosen = scene_.boxes ? scene_.boxes->section_at(scene_.crosshair) : -1;
+  if (boxes_ == scene_.boxes && chosen_ == chosen) return;
+  boxes_ = scene_.boxes;
+  chosen_ = chosen;
+  std::vector<WireBox> wires;
+  if (boxes_)
+    for (const DrawnBox& box : drawn_boxes(*boxes_, chosen))
+      wires.push_back({box.first, box.last, box.colour, box.wide, box.dashed});
+  view_->scene().show_boxes(grid_of(scene_.scan.geometry), wires);
+  view_->redraw();
 }
 
 void ImagingSolid::show_state() {

@@ -65,6 +65,7 @@ class ImagingSolid : public QWidget {
   void show_tints();
   // `all`: also those that are there, with another radius.
   void show_marks(bool all = false);
+  void show_boxes();
   // Which picture there is, and what it says.
   void show_state();
 
@@ -75,6 +76,8 @@ class ImagingSolid : public QWidget {
   std::map<int, Tint> tints_;                // of the bones of the picture
   std::array<std::vector<Vec3>, 3> marks_;   // by SolidMark, mm
   double mark_mm_ = 0.0;                     // their radius
+  std::shared_ptr<const KeptBoxes> boxes_;   // of the picture
+  int chosen_ = -1;                          // section of them
   bool has_surface_ = false, has_soft_ = false;
   QString problem_;  // why there is no surface
   QString notice_;   // in the picture

@@ -20,6 +20,7 @@ constexpr const char* kVoxelFile = "scan.nrrd";
 constexpr const char* kFilteredFiles[] = {"filtered-1.nrrd", "filtered-2.nrrd"};
 constexpr const char* kIslandFile = "islands.nrrd";
 constexpr const char* kEdgeFile = "edges.nrrd";
+constexpr const char* kKeptFile = "kept.nrrd";
 constexpr const char* kBoxFile = "box.edits.yaml";
 constexpr const char* kPictures = "pictures";
 // Files with one scan by the ends of their names. What is inside decides in osteon-import.
@@ -87,6 +88,7 @@ ImagingSteps::ImagingSteps(Events events)
       shown_file_(kVoxelFile) {}
 
 ImagingSteps::~ImagingSteps() {
+  cancelled_ = true;
   if (loader_) loader_->wait();
   run_.reset();
   const bool unfinished = maker_ != nullptr;
@@ -256,6 +258,27 @@ void ImagingSteps::find_edges(const ScanGeometry& scan) {
                     events_.edges(std::move(*edges));
                   });
   });
+}
+
+void ImagingSteps::write_boxes(const ScanGeometry& scan, const IslandMap& islands, const KeptParts& kept,
+                               double threshold_hu, int subdivisions, const std::filesystem::path& folder) {
+  cancelled_ = false;
+  const QStringList arguments{"report",         scratch_file(shown_file_),
+                              "--bone",         scratch_file(kKeptFile),
+                              "--threshold",    QString::number(threshold_hu, 'g', 17),
+                              "--out",          text_of(folder),
+                              "--subdivisions", QString::number(subdivisions)};
+  in_background(
+      [this, &scan, &islands, kept] {
+        kept_ = write_kept(scratch_ / kKeptFile, scan, islands, kept, [this](double) { return !cancelled_; });
+      },
+      [this, arguments, folder] {
+        if (!kept_) return fail(QString::fromStdString(kept_.error().message));
+        start(arguments, [this, folder](const QString&) {
+          QFile::remove(scratch_file(kKeptFile));
+          events_.boxes_written(folder);
+        });
+      });
 }
 
 void ImagingSteps::make(const ImagingEdits& edits, bool with_report) {

@@ -6,6 +6,7 @@
 #include <QString>
 #include <QStringList>
 #include <QThread>
+#include <atomic>
 #include <filesystem>
 #include <functional>
 #include <memory>
@@ -17,6 +18,7 @@
 #include "viewer_client/imaging/hu_histogram.hpp"
 #include "viewer_client/imaging/imaging_edits.hpp"
 #include "viewer_client/imaging/island_map.hpp"
+#include "viewer_client/imaging/kept_slices.hpp"
 
 namespace osteon {
 
@@ -42,6 +44,7 @@ class ImagingSteps : public QObject {
     std::function<void(ShownScan scan, const HuHistogram&histogram)> read, filtered;
     std::function<void(std::vector<ListedIsland> list, IslandMap map)> found;
     std::function<void(VoxelFile<std::uint8_t> edges)> edges;
+    std::function<void(const std::filesystem::path& folder)> boxes_written;
     std::function<void(const std::filesystem::path& bone)> made;
     std::function<void(const QString& sentence)> failed;  // empty: cancelled
   };
@@ -62,6 +65,10 @@ class ImagingSteps : public QObject {
   void find(const ScanGeometry& scan, const ImagingEdits& edits);
   // The edges of the filtered scan: tells `edges`.
   void find_edges(const ScanGeometry& scan);
+  // The root sub-volumes of what is kept, in a folder that is not there yet, by "osteon-import report". Scan and
+  // islands stay as they are until this ends. Tells `boxes_written`.
+  void write_boxes(const ScanGeometry& scan, const IslandMap& islands, const KeptParts& kept, double threshold_hu,
+                   int subdivisions, const std::filesystem::path& folder);
   // The case has the edit list beside it, in a file NAME.edits.yaml. With a report it has that in report_folder(), too.
   void make(const ImagingEdits& edits, bool with_report);
 
@@ -80,9 +87,9 @@ class ImagingSteps : public QObject {
   std::filesystem::path scratch_;
   QString source_;
   std::optional<int> series_;
-  const char* shown_file_;     // in the scratch folder: the scan, or a filtered one
-  std::filesystem::path out_;  // the case that is made
-  bool cancelled_ = false;
+  const char* shown_file_;              // in the scratch folder: the scan, or a filtered one
+  std::filesystem::path out_;           // the case that is made
+  std::atomic<bool> cancelled_{false};  // the other thread asks, too
   std::unique_ptr<ImporterRun> run_;
   std::unique_ptr<CaseMaker> maker_;
   // The other thread writes these, and the GUI thread reads them when it has ended.
@@ -90,6 +97,7 @@ class ImagingSteps : public QObject {
   HuHistogram histogram_;  // of the scan
   Result<IslandMap> islands_;
   Result<VoxelFile<std::uint8_t>> edges_;
+  Result<void> kept_;
   std::unique_ptr<QThread> loader_;
 };
 

@@ -18,66 +18,6 @@ namespace {
 constexpr std::size_t kMostTriangles = 1'000'000;
 constexpr std::int64_t kSolidPart = 4;  // a block is solid from this part of it on
 
-// The plane of each slice along the voxels, so that its pixels lie as the voxels do.
-PlaneAxes along_voxels(const ScanGeometry& scan) {
-  PlaneAxes axes;
-  axes.columns = scan.dims[0];
-  axes.rows = scan.dims[1];
-  axes.slices = scan.dims[2];
-  return axes;
-}
-
-// The bones of the voxels that are kept, slice by slice.
-class KeptSlices {
- public:
-  KeptSlices(const ScanGeometry& scan, const IslandMap& islands, const KeptParts& kept)
-      : scan_(scan),
-        islands_(islands),
-        kept_(kept),
-        axes_(along_voxels(scan)),
-        range_(range_of(scan, kept.box)),
-        row_(static_cast<std::size_t>(scan.dims[0])) {
-    for (std::size_t island = 1; island < kept.bones.size(); ++island) {
-      of_island_[island] = static_cast<std::uint8_t>(shown_bone(kept.bones[island]));
-      bones_.set(of_island_[island]);
-    }
-    for (const SharedCorrection& correction : kept.corrections)
-      if (correction->kind == CorrectionKind::paint) bones_.set(static_cast<std::size_t>(correction->bone));
-    bones_.reset(0);
-  }
-
-  // That may have such a voxel.
-  [[nodiscard]] const std::bitset<256>& bones() const { return bones_; }
-  // Calls `visit` with each row of the slice that may have one: a bone for each column, or 0.
-  template <class Visit>
-  void each_row(int slice, Visit visit) {
-    if (slice < range_.first[2] || slice > range_.last[2]) return;
-    const auto marks = corrected_plane(scan_, islands_, kept_.bones, axes_, slice, kept_.corrections);
-    for (int row = range_.first[1]; row <= range_.last[1]; ++row) {
-      std::ranges::fill(row_, std::uint8_t{0});
-      const std::size_t first = static_cast<std::size_t>(row) * row_.size();
-      for (int column = range_.first[0]; column <= range_.last[0]; ++column) {
-        const auto at = static_cast<std::size_t>(column);
-        const std::uint8_t mark = marks.empty() ? std::uint8_t{0} : marks[first + at];
-        row_[at] = mark == 0         ? of_island_[islands_.number({column, row, slice})]
-                   : mark == kErased ? std::uint8_t{0}
-                                     : mark;
-      }
-      visit(row, std::span<const std::uint8_t>(row_));
-    }
-  }
-
- private:
-  const ScanGeometry& scan_;
-  const IslandMap& islands_;
-  const KeptParts& kept_;
-  PlaneAxes axes_;
-  VoxelRange range_;
-  std::array<std::uint8_t, 256> of_island_{};
-  std::bitset<256> bones_;
-  std::vector<std::uint8_t> row_;
-};
-
 // The voxels of each bone in the blocks of one slice of blocks.
 class BoneCounts {
  public:
@@ -143,12 +83,17 @@ Result<VoxelFile<std::uint8_t>> bones_of_blocks(const ScanGeometry& scan, const 
   BoneCounts counts(scan, blocks, slices.bones());
   VoxelFile<std::uint8_t> bones{blocks.geometry, {}};
   bones.values.reserve(blocks.geometry.count());
+  const auto columns = static_cast<std::size_t>(scan.dims[0]);
   for (int block = 0; block < blocks.geometry.dims[2]; ++block) {
     counts.begin(block);
     for (int slice = counts.slice().first_slice(); slice < counts.slice().last_slice(); ++slice) {
       if (!keep_going(static_cast<double>(slice) / scan.dims[2]))
         return stopped_while("making the surface of the kept parts");
-      slices.each_row(slice, [&](int row, std::span<const std::uint8_t> of_row) { counts.add(row, of_row); });
+      const VoxelRange& range = slices.range();
+      if (slice < range.first[2] || slice > range.last[2]) continue;
+      const auto of_slice = slices.slice(slice);
+      for (int row = range.first[1]; row <= range.last[1]; ++row)
+        counts.add(row, of_slice.subspan(static_cast<std::size_t>(row) * columns, columns));
     }
     for (std::size_t i = 0; i < counts.slice().size(); ++i) bones.values.push_back(counts.bone(i));
   }

@@ -1,23 +1,14 @@
 // The surfaces of the bones that are kept of a scan, as far as they are known before osteon-import makes the bone.
 #pragma once
 #include <array>
-#include <optional>
 #include <span>
 #include <vector>
 
 #include "common/core/keep_going.hpp"
 #include "common/surface/mesh_block.hpp"
-#include "viewer_client/imaging/corrected_plane.hpp"
+#include "viewer_client/imaging/kept_slices.hpp"
 
 namespace osteon {
-
-// What decides whether a voxel is kept, besides the islands.
-struct KeptParts {
-  BonesOfIslands bones{};
-  std::vector<SharedCorrection> corrections;  // in their order
-  std::optional<MarkedBox> box;
-  friend bool operator==(const KeptParts&, const KeptParts&) = default;
-};
 
 struct KeptSurface {
   int bone = 0;

@@ -1,6 +1,8 @@
 #include "viewer_client/imaging/scan_file.hpp"
 
 #include <algorithm>
+#include <array>
+#include <charconv>
 #include <fstream>
 #include <map>
 #include <new>
@@ -96,6 +98,23 @@ Result<ShownScan> read_scan_file(const std::filesystem::path& file) { return rea
 
 Result<VoxelFile<std::uint8_t>> read_number_file(const std::filesystem::path& file) {
   return read_voxels<std::uint8_t>(file, "uint8");
+}
+
+std::string number_file_header(const ScanGeometry& geometry) {
+  // Every number comes back bit for bit, in every locale.
+  const auto number = [](double value) {
+    std::array<char, 32> digits{};
+    return std::string(digits.data(), std::to_chars(digits.data(), digits.data() + digits.size(), value).ptr);
+  };
+  const auto vector_text = [&](const Vec3& v) {
+    return "(" + number(v.x()) + "," + number(v.y()) + "," + number(v.z()) + ")";
+  };
+  std::string header = "NRRD0004\ntype: uint8\ndimension: 3\nspace: left-posterior-superior\nsizes:";
+  for (const int dim : geometry.dims) header += " " + std::to_string(dim);
+  header += "\nspace directions:";
+  for (int axis = 0; axis < 3; ++axis) header += " " + vector_text(geometry.axes_mm.col(axis));
+  return header + "\nkinds: domain domain domain\nendian: little\nencoding: raw\nspace origin: " +
+         vector_text(geometry.origin_mm) + "\n\n";
 }
 
 }  // namespace osteon

@@ -2,6 +2,7 @@
 #pragma once
 #include <cstdint>
 #include <filesystem>
+#include <string>
 #include <vector>
 
 #include "common/core/result.hpp"
@@ -34,5 +35,8 @@ using ShownScan = VoxelFile<std::int16_t>;  // HU
 // not_found, invalid_input (another kind of file, or it ends early), exhausted (memory).
 [[nodiscard]] Result<ShownScan> read_scan_file(const std::filesystem::path& file);
 [[nodiscard]] Result<VoxelFile<std::uint8_t>> read_number_file(const std::filesystem::path& file);
+
+// The header of such a file of numbers. Its voxels follow, a byte each.
+[[nodiscard]] std::string number_file_header(const ScanGeometry& geometry);
 
 }  // namespace osteon

@@ -1,12 +1,17 @@
 #include "viewer_client/render/solid_scene.hpp"
 
 #include <vtkActor.h>
+#include <vtkCellArray.h>
+#include <vtkCellData.h>
 #include <vtkLineSource.h>
 #include <vtkNew.h>
+#include <vtkPoints.h>
+#include <vtkPolyData.h>
 #include <vtkPolyDataMapper.h>
 #include <vtkProperty.h>
 #include <vtkRenderWindow.h>
 #include <vtkRenderer.h>
+#include <vtkUnsignedCharArray.h>
 
 #include "viewer_client/render/layer_above.hpp"
 #include "viewer_client/render/lighting.hpp"
@@ -22,6 +27,40 @@ namespace {
 constexpr std::array<double, 3> kCrossColour{0.35, 0.90, 0.55};  // as on the planes
 constexpr double kCrossBehind = 0.3;                             // opacity, where the surface hides it
 constexpr float kCrossWidth_px = 1.5f;
+constexpr float kBoxWidth_px = 1.5f, kWideBox_px = 4.0f;
+constexpr int kDashes = 12;  // along an edge
+
+// Lines with a colour each.
+struct Lines {
+  vtkNew<vtkPoints> points;
+  vtkNew<vtkCellArray> cells;
+  vtkNew<vtkUnsignedCharArray> colours;
+
+  Lines() { colours->SetNumberOfComponents(3); }
+  void add(const Vec3& from, const Vec3& to, const std::array<std::uint8_t, 3>& colour) {
+    cells->InsertNextCell(2);
+    for (const Vec3& end : {from, to}) cells->InsertCellPoint(points->InsertNextPoint(end.x(), end.y(), end.z()));
+    colours->InsertNextTypedTuple(colour.data());
+  }
+  // The twelve edges, along the outer faces of the voxels.
+  void add(const VoxelGrid& grid, const WireBox& box) {
+    for (int axis = 0; axis < 3; ++axis)
+      for (int side = 0; side < 4; ++side) {
+        Vec3 begin, end;
+        for (int of = 0; of < 3; ++of) {
+          const auto a = static_cast<std::size_t>(of);
+          const bool far = of == (axis + 1) % 3 ? (side & 1) != 0 : (side & 2) != 0;
+          const double low = box.first[a] - 0.5, high = box.last[a] + 0.5;
+          begin[of] = of == axis ? low : far ? high : low;
+          end[of] = of == axis ? high : begin[of];
+        }
+        const Vec3 from = grid.origin_mm + grid.axes_mm * begin, way = grid.axes_mm * (end - begin);
+        const int pieces = box.dashed ? 2 * kDashes : 1;
+        for (int piece = 0; piece < pieces; piece += 2)
+          add(from + way * piece / pieces, from + way * (piece + 1) / pieces, box.colour);
+      }
+  }
+};
 
 }  // namespace
 
@@ -44,6 +83,14 @@ struct SolidScene::Impl {
       layer->add(line.behind, 0);
     }
     marks.emplace(*layer);
+    for (BoxLines* of : {&boxes, &wide_boxes}) {
+      of->mapper->SetInputData(of->lines);
+      of->actor->SetMapper(of->mapper);
+      of->actor->GetProperty()->LightingOff();
+      of->actor->GetProperty()->SetLineWidth(of == &boxes ? kBoxWidth_px : kWideBox_px);
+      of->actor->PickableOff();
+      renderer->AddActor(of->actor);
+    }
     marker.show(true);
   }
   Impl(const Impl&) = delete;
@@ -60,6 +107,12 @@ struct SolidScene::Impl {
     vtkNew<vtkActor> before, behind;  // hidden by the surface, and drawn over it
   };
 
+  struct BoxLines {
+    vtkNew<vtkPolyData> lines;
+    vtkNew<vtkPolyDataMapper> mapper;
+    vtkNew<vtkActor> actor;
+  };
+
   vtkRenderWindow& window;
   vtkNew<vtkRenderer> renderer;
   SolidBones bones{*renderer};
@@ -69,6 +122,7 @@ struct SolidScene::Impl {
   std::optional<LayerAbove> layer;
   std::optional<SolidMarks> marks;
   std::array<CrossLine, 3> cross;
+  BoxLines boxes, wide_boxes;
 };
 
 SolidScene::SolidScene(vtkRenderWindow& window) : impl_(std::make_unique<Impl>(window)) {}
@@ -93,6 +147,18 @@ void SolidScene::show_cross(const VoxelGrid& grid, const std::array<int, 3>& vox
     const Vec3 from = grid.origin_mm + grid.axes_mm * first, to = grid.origin_mm + grid.axes_mm * last;
     impl_->cross[axis].ends->SetPoint1(from.x(), from.y(), from.z());
     impl_->cross[axis].ends->SetPoint2(to.x(), to.y(), to.z());
+  }
+}
+
+void SolidScene::show_boxes(const VoxelGrid& grid, std::span<const WireBox> boxes) {
+  for (Impl::BoxLines* to : {&impl_->boxes, &impl_->wide_boxes}) {
+    Lines lines;
+    for (const WireBox& box : boxes)
+      if (box.wide == (to == &impl_->wide_boxes)) lines.add(grid, box);
+    to->lines->SetPoints(lines.points);
+    to->lines->SetLines(lines.cells);
+    to->lines->GetCellData()->SetScalars(lines.colours);
+    to->lines->Modified();
   }
 }
 

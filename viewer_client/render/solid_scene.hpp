@@ -18,6 +18,13 @@ class vtkRenderWindow;
 
 namespace osteon {
 
+// The edges of a box of voxels, both ends included.
+struct WireBox {
+  std::array<int, 3> first{}, last{};
+  std::array<std::uint8_t, 3> colour{};
+  bool wide = false, dashed = false;
+};
+
 class SolidScene {
  public:
   // Adds its renderers to the window, which must outlive it.
@@ -31,6 +38,8 @@ class SolidScene {
   [[nodiscard]] bool has_soft_tissue() const;
   // Three lines through the voxel of the crosshair, to the ends of the grid. They are faint behind the bones.
   void show_cross(const VoxelGrid& grid, const std::array<int, 3>& voxel);
+  // Empty: none.
+  void show_boxes(const VoxelGrid& grid, std::span<const WireBox> boxes);
   // UTF-8; empty: nothing.
   void show_notice(const std::string& notice);
 

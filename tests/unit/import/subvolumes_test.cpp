@@ -268,6 +268,41 @@ TEST(SubVolumeInput, OfACaseInItsSourceIsThatOfTheSource) {
   }
 }
 
+// Two pieces of a row, with a number each.
+TEST(SubVolumeInput, OfMarksIsWhatHasANumber) {
+  LabelMap marks;
+  marks.file = "marks.nrrd";
+  marks.grid = shaft_scan().volume;
+  marks.segments = {{.number = 1, .name = {}, .type = {}, .runs = {{3, 6, 5, 2}}},
+                    {.number = 9, .name = {}, .type = {}, .runs = {{30, 39, 35, 23}}}};
+  const auto input = input_of_marked(shaft_scan(), marks, 226.0, keep_going);
+  ASSERT_TRUE(input) << input.error().message;
+  EXPECT_EQ(std::ranges::count(input->bone, 1), 14);
+  EXPECT_EQ(input->bone[input->voxels().index({3, 5, 2})], 1);
+  EXPECT_EQ(input->bone[input->voxels().index({39, 35, 23})], 1);
+  EXPECT_EQ(input->hu, shaft_scan().volume.values);
+  LabelMap half_a_voxel = marks, coarser = marks, fewer = marks;
+  half_a_voxel.grid.origin_mm.x() += 0.25;
+  coarser.grid.spacing_mm *= 1.01;
+  fewer.grid.dims[2] -= 1;
+  for (const LabelMap& wrong : {half_a_voxel, coarser, fewer}) {
+    const auto refused = input_of_marked(shaft_scan(), wrong, 226.0, keep_going);
+    ASSERT_FALSE(refused);
+    EXPECT_THAT(refused.error().message, HasSubstr("marks.nrrd"));
+    EXPECT_THAT(refused.error().message, HasSubstr("--bone"));
+  }
+  EXPECT_FALSE(input_of_marked(shaft_scan(), marks, 226.0, [](double) { return false; }));
+}
+
+TEST_F(SubVolumeProgram, TakesBoneFromALabelMap) {
+  ASSERT_EQ(run({path("islands.nrrd")}, "islands").exit_code, 0);
+  const auto all = run({"--bone", path("islands.nrrd")});
+  ASSERT_EQ(all.exit_code, 0) << all.err;
+  // The shaft on its foot, and the ball beside them.
+  EXPECT_THAT(all.out, HasSubstr("bone       " + std::to_string(21 * 21 * 6 + 7 * 7 * 14 + 27) + " voxels"));
+  EXPECT_THAT(all.out, HasSubstr("4 sections of 6 4 3 7 slices"));
+}
+
 TEST_F(SubVolumeProgram, SaysInOneSentenceWhatIsWrong) {
   fs::create_directories(folder_ / "out");
   expect_sentence(run({"--out", path("out")}), "already there");
@@ -278,6 +313,9 @@ TEST_F(SubVolumeProgram, SaysInOneSentenceWhatIsWrong) {
   expect_sentence(test::run(OSTEON_IMPORT_PROGRAM, {"report", path("case"), "--threshold", "300"}), "--threshold");
   expect_sentence(test::run(OSTEON_IMPORT_PROGRAM, {"report", path("case"), "--series", "1"}), "leave out");
   expect_sentence(run({"--source", path("case")}), "--source is for a case");
+  expect_sentence(test::run(OSTEON_IMPORT_PROGRAM, {"report", path("case"), "--bone", path("none.nrrd")}),
+                  "--bone is for a scan");
+  expect_sentence(run({"--bone", path("none.nrrd")}), "none.nrrd");
   ASSERT_EQ(test::run(OSTEON_IMPORT_PROGRAM,
                       {"phantom", "block", "--layers", "4:1.5", "--width", "6", "--out", path("block")})
                 .exit_code,

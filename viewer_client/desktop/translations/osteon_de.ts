@@ -690,6 +690,89 @@
     </message>
 </context>
 <context>
+    <name>ImagingBoxes</name>
+    <message>
+        <source>Nothing is kept. Keep a bone first.</source>
+        <translation>Nichts wird behalten. Behalten Sie zuerst einen Knochen.</translation>
+    </message>
+    <message>
+        <source>Bounding box: %1 × %2 × %3, %4 voxels, %5 % of the scan</source>
+        <translation>Hüllquader: %1 × %2 × %3, %4 Voxel, %5 % des Scans</translation>
+    </message>
+    <message>
+        <source>Section boxes: %1, %2 voxels, %3 % of the scan</source>
+        <translation>Abschnittsquader: %1, %2 Voxel, %3 % des Scans</translation>
+    </message>
+    <message>
+        <source>Leaves: %1, of which %2 are full and %3 partly full</source>
+        <translation>Blätter: %1, davon %2 voll und %3 teilweise voll</translation>
+    </message>
+    <message>
+        <source>Sub-volumes</source>
+        <translation>Teilvolumen</translation>
+    </message>
+    <message>
+        <source>Subdivisions of each section</source>
+        <translation>Unterteilungen jedes Abschnitts</translation>
+    </message>
+    <message>
+        <source>How often each section is divided into quadrants</source>
+        <translation>Wie oft jeder Abschnitt in Quadranten geteilt wird</translation>
+    </message>
+    <message>
+        <source>Yellow, dashed: bounding box. Blue: section boxes. Orange, wide: the chosen one.</source>
+        <translation>Gelb, gestrichelt: Hüllquader. Blau: Abschnittsquader. Orange, breit: der gewählte.</translation>
+    </message>
+    <message>
+        <source>Green: full leaves. Pink, dashed: leaves that are partly full.</source>
+        <translation>Grün: volle Blätter. Rosa, gestrichelt: teilweise volle Blätter.</translation>
+    </message>
+    <message>
+        <source>Section boxes</source>
+        <translation>Abschnittsquader</translation>
+    </message>
+    <message>
+        <source>Moves the crosshair into the section. A click on a plane chooses the one there.</source>
+        <translation>Bringt das Fadenkreuz in den Abschnitt. Ein Klick auf eine Ebene wählt den dortigen.</translation>
+    </message>
+    <message>
+        <source>Subdivisions</source>
+        <translation>Unterteilungen</translation>
+    </message>
+    <message>
+        <source>Close</source>
+        <translation>Schließen</translation>
+    </message>
+    <message>
+        <source>&amp;Write root sub-volumes…</source>
+        <translation>&amp;Wurzel-Teilvolumen schreiben…</translation>
+    </message>
+    <message>
+        <source>Makes a folder with Meta.dat, SBB1.dat and so on, the report, and a picture of the boxes</source>
+        <translation>Legt einen Ordner mit Meta.dat, SBB1.dat usw., Bericht und Bild der Quader an</translation>
+    </message>
+    <message>
+        <source>The parts of bone are not known yet.</source>
+        <translation>Die Knochenteile sind noch nicht bekannt.</translation>
+    </message>
+    <message>
+        <source>Being found …</source>
+        <translation>Wird gesucht …</translation>
+    </message>
+    <message>
+        <source>%1: %2 × %3 × %4, %5 % of the scan</source>
+        <translation>%1: %2 × %3 × %4, %5 % des Scans</translation>
+    </message>
+    <message>
+        <source>Where the folder of the sub-volumes is to be</source>
+        <translation>Wo der Ordner der Teilvolumen liegen soll</translation>
+    </message>
+    <message>
+        <source>There are no sub-volumes yet.</source>
+        <translation>Es gibt noch keine Teilvolumen.</translation>
+    </message>
+</context>
+<context>
     <name>ImagingHistogram</name>
     <message>
         <source>Histogram of the HU</source>
@@ -1140,6 +1223,22 @@
     <message>
         <source>Part %1 is chosen in the list.</source>
         <translation>Teil %1 ist in der Liste gewählt.</translation>
+    </message>
+    <message>
+        <source>Sub-volumes…</source>
+        <translation>Teilvolumen…</translation>
+    </message>
+    <message>
+        <source>Shows bounding box, section boxes and quadtree of what is kept, and writes them</source>
+        <translation>Zeigt Hüllquader, Abschnittsquader und Quadtree des Behaltenen und schreibt sie</translation>
+    </message>
+    <message>
+        <source>Writing the root sub-volumes</source>
+        <translation>Die Wurzel-Teilvolumen werden geschrieben</translation>
+    </message>
+    <message>
+        <source>The root sub-volumes are in %1.</source>
+        <translation>Die Wurzel-Teilvolumen sind in %1.</translation>
     </message>
 </context>
 <context>

@@ -1,0 +1,204 @@
+// Sub-volumes on the page of image processing, with the mouse and the keyboard: they are those of a bone of known
+// boxes, and the files are those of osteon-import.
+#include <gtest/gtest.h>
+
+#include <QDialog>
+#include <QLabel>
+#include <QListWidget>
+#include <QLocale>
+#include <QPushButton>
+#include <QSlider>
+#include <QSpinBox>
+#include <QTest>
+#include <algorithm>
+#include <cstdlib>
+
+#include "common/geometry/lattice.hpp"
+#include "common/runtime/files.hpp"
+#include "tests/integration/imaging_bench.hpp"
+#include "tests/support/process.hpp"
+#include "viewer_client/desktop/imaging_solid.hpp"
+
+namespace osteon {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr CoordBox kFootOfBone{{8, 6, 2}, {27, 25, 7}}, kNotchInFoot{{18, 16, 2}, {27, 25, 7}},
+    kShaftOfBone{{8, 6, 8}, {13, 11, 21}}, kBlockBeside{{34, 30, 12}, {36, 32, 14}};
+
+// A foot with a notch and a shaft on it, and a small block beside them, in muscle.
+imaging::HuVolume foot_and_shaft() {
+  imaging::HuVolume scan;
+  scan.dims = {40, 36, 24};
+  scan.spacing_mm = {0.9, 0.9, 1.5};
+  for (int k = 0; k < scan.dims[2]; ++k)
+    for (int j = 0; j < scan.dims[1]; ++j)
+      for (int i = 0; i < scan.dims[0]; ++i) {
+        const Coord at{i, j, k};
+        const bool bone = (kFootOfBone.contains(at) && !kNotchInFoot.contains(at)) || kShaftOfBone.contains(at) ||
+                          kBlockBeside.contains(at);
+        scan.values.push_back(bone ? test::kBall_hu : test::kMuscle_hu);
+      }
+  return scan;
+}
+
+class ImagingBoxesTest : public test::ImagingBench {
+ protected:
+  // The foot with the shaft is kept, and the dialog is open.
+  void SetUp() override {
+    ImagingBench::SetUp();
+    folder_ = series("foot", foot_and_shaft());
+    window_->process_images(QString::fromStdString(folder_.string()));
+    auto& list = part<QListWidget>("series");
+    ASSERT_TRUE(until([&] { return list.isVisible() && list.count() == 1; })) << words();
+    QTest::mouseClick(list.viewport(), Qt::LeftButton, {}, list.visualItemRect(list.item(0)).center());
+    auto& islands = part<QListWidget>("islands");
+    ASSERT_TRUE(until([&] { return islands.isVisible() && islands.isEnabled() && islands.count() == 2; })) << words();
+    keep({10, 8, 4});
+    QTest::keySequence(window_.get(), QKeySequence("Ctrl+Alt+B"));
+    ASSERT_TRUE(until([&] { return says("Section boxes: 2,"); })) << said();
+  }
+  void keep(const std::array<int, 3>& voxel) {
+    part<QSlider>("slice_axial").setValue(voxel[2]);
+    ImagingPlane& axial = plane("plane_axial");
+    double_click(axial, axial.pixel(voxel));
+  }
+  [[nodiscard]] std::string said() const { return label("sub_volumes_words").toStdString() + "; " + words(); }
+  [[nodiscard]] bool says(const QString& text) const { return label("sub_volumes_words").contains(text); }
+  [[nodiscard]] QListWidget& sections() const { return part<QListWidget>("sections"); }
+  // The colour of the line between two neighbours of a row in the axial plane; black, if there is no line of a section.
+  [[nodiscard]] QColor line_between(const std::array<int, 3>& a, const std::array<int, 3>& b) const {
+    ImagingPlane& axial = plane("plane_axial");
+    const QImage image = axial.grab().toImage();
+    const QPoint middle = (axial.pixel(a) + axial.pixel(b)) / 2;
+    for (int x = -2; x <= 2; ++x) {
+      const QColor colour = image.pixelColor(middle + QPoint(x, 0));
+      for (const auto& [red, green, blue] : {kSectionColour, kChosenColour})
+        if (colour == QColor(red, green, blue)) return colour;
+    }
+    return Qt::black;
+  }
+  // The chosen section in three dimensions: how many pixels have its colour, and the highest of their rows.
+  struct Orange {
+    int pixels = 0, top = 0;
+  };
+  [[nodiscard]] Orange orange() const {
+    auto* solid = dynamic_cast<ImagingSolid*>(window_->findChild<QWidget*>("solid"));
+    const Image image = solid->view().scene().image();
+    Orange seen;
+    for (int y = 0; y < image.height_px; ++y)
+      for (int x = 0; x < image.width_px; ++x) {
+        const auto c = image.at(x, y);
+        if (c[0] <= 210 || c[1] <= 140 || c[1] >= 180 || c[2] >= 30) continue;
+        if (seen.pixels == 0) seen.top = y;
+        ++seen.pixels;
+      }
+    return seen;
+  }
+  void write(const fs::path& to) {
+    const test::FolderChooser chooser(QString::fromStdString(to.string()));
+    QTest::mouseClick(&part<QPushButton>("write_sub_volumes"), Qt::LeftButton);
+  }
+  void keep_picture(const char* name) const {
+    const char* folder = std::getenv("OSTEON_TEST_PICTURES");
+    if (folder == nullptr) return;
+    window_->grab().save(QString("%1/%2.png").arg(folder, name));
+    part<QDialog>("sub_volumes").grab().save(QString("%1/%2_dialog.png").arg(folder, name));
+  }
+  fs::path folder_;
+};
+
+constexpr QColor kOrange{kChosenColour[0], kChosenColour[1], kChosenColour[2]},
+    kBlue{kSectionColour[0], kSectionColour[1], kSectionColour[2]};
+
+TEST_F(ImagingBoxesTest, AreThoseOfAKnownBoneAndFollowIt) {
+  const auto count = [](int voxels) { return QLocale().toString(voxels); };
+  EXPECT_TRUE(says("20 × 20 × 20, " + count(8000) + " voxels, 23.15 %")) << said();
+  EXPECT_TRUE(says("Section boxes: 2, " + count(20 * 20 * 6 + 6 * 6 * 14) + " voxels, 8.40 %")) << said();
+  // The quadrant of the foot with the notch is empty.
+  EXPECT_TRUE(says("Leaves: 4, of which 4 are full and 0 partly full")) << said();
+  auto& subdivisions = part<QSpinBox>("subdivisions");
+  EXPECT_EQ(subdivisions.value(), 3);
+  subdivisions.setFocus();
+  for (int i = 0; i < 3; ++i) QTest::keyClick(&subdivisions, Qt::Key_Down);
+  ASSERT_TRUE(until([&] { return says("Leaves: 2, of which 1 are full and 1 partly full"); })) << said();
+
+  // The crosshair is in the foot, which is chosen. Another section is chosen in the list.
+  ImagingPlane &axial = plane("plane_axial"), &coronal = plane("plane_coronal"), &sagittal = plane("plane_sagittal");
+  ASSERT_EQ(sections().count(), 2);
+  EXPECT_EQ(sections().currentRow(), 0);
+  EXPECT_EQ(line_between({27, 20, 4}, {28, 20, 4}), kOrange);
+  ASSERT_TRUE(until([&] { return orange().pixels > 40; }));
+  const int top_of_foot = orange().top;
+  QTest::mouseClick(sections().viewport(), Qt::LeftButton, {}, sections().visualItemRect(sections().item(1)).center());
+  EXPECT_EQ(sections().currentRow(), 1);
+  EXPECT_TRUE(kShaftOfBone.contains({sagittal.slice(), coronal.slice(), axial.slice()}));
+  EXPECT_EQ(line_between({13, 10, 14}, {14, 10, 14}), kOrange);
+  EXPECT_EQ(line_between({27, 20, 14}, {28, 20, 14}), QColor(Qt::black)) << "a box of other slices";
+  // The shaft is above the foot.
+  EXPECT_TRUE(until([&] { return orange().pixels > 40 && orange().top < top_of_foot - 40; })) << orange().top;
+  keep_picture("boxes_shaft");
+  sections().setFocus();
+  QTest::keyClick(&sections(), Qt::Key_Up);
+  EXPECT_TRUE(kFootOfBone.contains({sagittal.slice(), coronal.slice(), axial.slice()}));
+  // Beside all sections, none is chosen.
+  QTest::mouseClick(&axial, Qt::LeftButton, {}, axial.pixel({35, 31, axial.slice()}));
+  EXPECT_EQ(sections().currentRow(), -1);
+  EXPECT_EQ(line_between({27, 20, 4}, {28, 20, 4}), kBlue);
+  EXPECT_TRUE(until([&] { return orange().pixels == 0; })) << orange().pixels;
+  QTest::mouseClick(&axial, Qt::LeftButton, {}, axial.pixel({10, 20, axial.slice()}));
+  EXPECT_EQ(sections().currentRow(), 0);
+
+  // With the block, slices 12 to 14 get a section of their own, and those below and above it too.
+  keep({35, 31, 13});
+  EXPECT_FALSE(says("Section boxes: 2,")) << "of what was kept before";
+  ASSERT_TRUE(until([&] { return says("Section boxes: 4,"); })) << said();
+  EXPECT_EQ(sections().count(), 4);
+  QTest::keySequence(&sections(), QKeySequence::Undo);
+  ASSERT_TRUE(until([&] { return says("Section boxes: 2,"); })) << said();
+
+  // Closed, it shows nothing.
+  part<QSlider>("slice_axial").setValue(4);
+  part<QDialog>("sub_volumes").close();
+  EXPECT_EQ(line_between({27, 20, 4}, {28, 20, 4}), QColor(Qt::black));
+  EXPECT_TRUE(until([&] { return orange().pixels == 0; })) << orange().pixels;
+}
+
+TEST_F(ImagingBoxesTest, TheFilesAreThoseOfTheImporter) {
+  const fs::path to = desk_->temp() / "files";
+  fs::create_directories(to);
+  write(to);
+  QTest::mouseClick(&part<QPushButton>("imaging_cancel"), Qt::LeftButton);
+  ASSERT_TRUE(until([&] { return words() == "Cancelled. Nothing was written."; })) << words();
+  EXPECT_TRUE(fs::is_empty(to));
+  write(to);
+  ASSERT_TRUE(until([&] { return words() == "The root sub-volumes are in " + (to / "sub-volumes").string() + "."; }))
+      << words();
+
+  // Of the scan, that takes the largest bone. It is the one that is kept.
+  const fs::path again = desk_->temp() / "files-again";
+  const auto run = test::run(test::program("osteon-import"), {"report", folder_.string(), "--out", again.string()});
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  for (const char* name : {"Meta.dat", "SBB1.dat", "SBB2.dat"}) {
+    const auto of_window = read_file(to / "sub-volumes" / name), of_importer = read_file(again / name);
+    ASSERT_TRUE(of_window) << of_window.error().message;
+    ASSERT_TRUE(of_importer) << of_importer.error().message;
+    EXPECT_EQ(*of_window, *of_importer) << name;
+  }
+  EXPECT_NE(read_file(to / "sub-volumes" / "SBB1.dat")->find("DIMENSIONS 20 20 6\nSPACING 0.9 0.9 1.5\n"),
+            std::string::npos);
+  for (const char* name : {"SBB3.dat", "report.txt", "report.json", "boxes.png"})
+    EXPECT_EQ(fs::exists(to / "sub-volumes" / name), name != std::string("SBB3.dat")) << name;
+
+  // With the block that osteon-import leaves out.
+  keep({35, 31, 13});
+  ASSERT_TRUE(until([&] { return says("Section boxes: 4,"); })) << said();
+  write(to);
+  ASSERT_TRUE(until([&] { return words().ends_with("sub-volumes-2."); })) << words();
+  EXPECT_TRUE(fs::exists(to / "sub-volumes-2" / "SBB4.dat"));
+  EXPECT_NE(read_file(to / "sub-volumes-2" / "SBB3.dat")->find("DIMENSIONS 29 27 3\n"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace osteon
