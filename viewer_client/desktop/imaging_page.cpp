@@ -1,5 +1,6 @@
 #include "viewer_client/desktop/imaging_page.hpp"
 
+#include <QCheckBox>
 #include <QComboBox>
 #include <QDoubleSpinBox>
 #include <QFileDialog>
