@@ -94,7 +94,7 @@ std::int16_t PixelReader::Scale::hu(std::uint16_t raw) const {
   return imaging::nearest_hu(stored * slope + intercept);
 }
 
-// A slice has more pixels than there are values, and its neighbour mostly has the same scale.
+// Mostly, a slice has more pixels than there are values, and its neighbour has the same scale.
 void PixelReader::set_scale(const Scale& scale) {
   if (scale == scale_ && !hu_.empty()) return;
   scale_ = scale;

@@ -27,6 +27,7 @@ namespace fs = std::filesystem;
 constexpr int kMostDeaths = 100;  // of processes that read headers
 // Fewer files, or a smaller archive, are searched in a moment. Then no progress appears before an error.
 constexpr std::size_t kManyFiles = 500;
+constexpr std::size_t kPixelMemory_bytes = std::size_t{4} << 30;  // of a process that decodes; a file may be a series
 constexpr std::uint64_t kLargeArchive = std::uint64_t{64} << 20;  // bytes
 constexpr double kUnpackedEnd = 0.4;                              // of the progress of an archive
 constexpr double kHeadersEnd = 0.6;
@@ -209,7 +210,7 @@ Result<void> read_volume(CtSeries& series, const FoundFiles& found, const KeepGo
   const std::size_t slices = series.slices.size(), planes = static_cast<std::size_t>(volume.dims[2]);
   std::size_t next = 0;
   IsolatedWork work;
-  work.memory_bytes = std::size_t{4} << 30;
+  work.memory_bytes = kPixelMemory_bytes;
   work.run = [&](ChildChannel& channel) -> Result<void> {
     silence_library();
     std::vector<std::int16_t> slice(static_cast<std::size_t>(series.entry.columns) *
@@ -293,6 +294,7 @@ Result<std::vector<std::int16_t>> middle_slice(const CtSeries& series, const Fou
   std::vector<std::int16_t> hu(static_cast<std::size_t>(series.entry.columns) *
                                static_cast<std::size_t>(series.entry.rows));
   IsolatedWork work;
+  work.memory_bytes = kPixelMemory_bytes;
   work.run = [&](ChildChannel& channel) -> Result<void> {
     silence_library();
     PixelReader reader;

@@ -382,6 +382,7 @@ TEST_F(ImagingTest, TheFirstSliceIsSeenBeforeTheOthersAreRead) {
   EXPECT_EQ(axial.slice(), 12);
   EXPECT_EQ(part<QSlider>("slice_axial").maximum(), 23);
   EXPECT_NE(words().find("middle slice"), std::string::npos) << words();
+  EXPECT_TRUE(part<QPushButton>("imaging_cancel").hasFocus());
   // Bone and muscle in a window of 2000 HU about 500 HU, beside the lines of the crosshair.
   const auto [column, row, slice] = ball(1);
   const auto grey = [](ImagingPlane& of, const std::array<int, 3>& voxel) {
@@ -393,6 +394,7 @@ TEST_F(ImagingTest, TheFirstSliceIsSeenBeforeTheOthersAreRead) {
   // No tool works on a scan that is not there.
   for (const char* name : {"plane_axial", "slice_axial", "threshold", "window_preset", "tool_paint", "keep_bone"})
     EXPECT_FALSE(part<QWidget>(name).isEnabled()) << name;
+  EXPECT_EQ(axial.toolTip(), "osteon-import is at work. Wait for it, or cancel it.");
   part<QSlider>("slice_axial").setValue(3);
   EXPECT_EQ(axial.slice(), 12);
   ASSERT_TRUE(until([&] { return found(2); })) << words();
@@ -413,7 +415,15 @@ TEST_F(ImagingTest, CancelAfterTheFirstSliceLeavesTheListAlone) {
   EXPECT_TRUE(list.hasFocus());
   EXPECT_TRUE(children("osteon-import").empty());
   EXPECT_EQ(test::names_in(scratch()), std::set<std::string>{"pictures"});
+  // Another source takes the place of a first slice too. A series without one is seen when it is read.
   choose_series(list);
+  ASSERT_TRUE(plane("plane_axial").isVisible());
+  window_->process_images(QString::fromStdString(series("other", two_balls()).string()));
+  ASSERT_TRUE(until([&] { return idle() && list.isVisible() && list.count() == 1; })) << words();
+  EXPECT_FALSE(plane("plane_axial").isVisible());
+  ASSERT_TRUE(fs::remove(scratch() / "pictures" / "series-1.nrrd"));
+  choose_series(list);
+  EXPECT_FALSE(plane("plane_axial").isVisible());
   ASSERT_TRUE(until([&] { return found(2); })) << words();
 }
 

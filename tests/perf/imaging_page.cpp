@@ -106,7 +106,12 @@ double difference_of(const QImage& drawn, const ImagingPlane& plane, const basel
 // Each step returns false, after a message, if the page did not do what it should.
 class Reader {
  public:
-  Reader() : page_({[](bool) {}, [](const std::filesystem::path&, const QString&) {}, [] {}}) {
+  Reader()
+      : page_({.busy = [](bool) {},
+               .made = [](const std::filesystem::path&, const QString&) {},
+               .may_send = [] { return false; },
+               .send = [](const std::filesystem::path&) {},
+               .leave = [] {}}) {
     page_.resize(1280, 900);
     page_.show();
     (void)QTest::qWaitForWindowExposed(&page_, 30000);

@@ -373,6 +373,8 @@ void ImagingPage::show_first(const ListedSeries& of) {
   histogram_->set_histogram({});
   begin_planes();
   show_work(tr("Reading the series. You see its middle slice; the tools wait for the others."));
+  // What is disabled cannot keep the keyboard's focus.
+  cancel_->setFocus();
 }
 
 void ImagingPage::forget_first() {
@@ -517,23 +519,27 @@ void ImagingPage::refresh_planes() {
 }
 
 void ImagingPage::enable_parts() {
-  const bool free = !steps_.busy(), making = steps_.making();
+  const bool free = !steps_.busy(), making = steps_.making(), waits = scene_.waits();
   // Until the user has stopped to change the threshold, the parts are of another one than the page shows.
   const bool changing = threshold_timer_.isActive();
   const bool found = free && !changing && scene_.open() && !islands_.empty() && current();
   const QString wait = tr("osteon-import is at work. Wait for it, or cancel it.");
   const QString none = free ? tr("Find the parts. If there are none, choose another threshold or box.") : wait;
   set_enabled(*back_, !making, wait);
-  set_enabled(*work_area_, !scene_.waits(), wait);
-  set_enabled(*threshold_, !making, wait);
-  set_enabled(*filter_, !making, wait);
+  set_enabled(*work_area_, !waits, wait);
+  // A part with a tool tip of its own says the reason too.
+  for (ImagingPlane* plane : planes_)
+    if (plane != nullptr) set_enabled(*plane, !waits, wait);
+  const bool changes = !making && !waits;
+  set_enabled(*threshold_, changes, wait);
+  set_enabled(*filter_, changes, wait);
   const bool gaussian = filter_->currentIndex() == kGaussianRow;
-  set_enabled(*gaussian_, !making && gaussian, making ? wait : tr("Choose the Gaussian first."));
-  set_enabled(*tools_, !making, wait);
+  set_enabled(*gaussian_, changes && gaussian, changes ? tr("Choose the Gaussian first.") : wait);
+  set_enabled(*tools_, changes, wait);
   tools_->set_found(found, none);
   set_enabled(*choice_, found, none);
-  set_enabled(*landmarks_, !making, wait);
-  set_enabled(*report_, !making, wait);
+  set_enabled(*landmarks_, changes, wait);
+  set_enabled(*report_, changes, wait);
   set_enabled(*edges_, free && scene_.open(), wait);
   // After a search that was cancelled or failed.
   find_->setVisible(free && !changing && scene_.open() && !current());
