@@ -194,15 +194,24 @@ TEST_F(ImagingEditsTest, LandmarksAreInTheCaseWhereTheClicksWere) {
   EXPECT_EQ(name.currentText(), "Right apex");
   QTest::mouseClick(&axial, Qt::LeftButton, {}, right);
   ASSERT_EQ(list.count(), 2);
+  // A standard one is seen in German, and stored in English.
+  speak("de");
+  name.setEditText("Großer Rollhügel");
+  QTest::mouseClick(&axial, Qt::LeftButton, {}, right);
+  ASSERT_EQ(list.count(), 3);
+  EXPECT_EQ(list.item(2)->text(), "Großer Rollhügel");
+  list.item(0)->setText("Innenknöchel");
+  ASSERT_TRUE(until([&] { return list.item(0)->data(Qt::UserRole).toString() == "Medial malleolus"; }));
+  speak("en");
   list.item(0)->setText("Left apex");
   // The page has the name, and not only the text of the list.
   ASSERT_TRUE(until([&] { return list.item(0)->data(Qt::UserRole).toString() == "Left apex"; }));
   EXPECT_EQ(axial.slice(), 12);
   list.setCurrentRow(0);
   QTest::mouseClick(&part<QPushButton>("landmark_remove"), Qt::LeftButton);
-  EXPECT_EQ(list.count(), 1);
-  click("undo_edit");
   EXPECT_EQ(list.count(), 2);
+  click("undo_edit");
+  EXPECT_EQ(list.count(), 3);
   click("tool_look");
   double_click(axial, axial.pixel(ball(1)));
   part<QCheckBox>("with_report").click();
@@ -215,9 +224,10 @@ TEST_F(ImagingEditsTest, LandmarksAreInTheCaseWhereTheClicksWere) {
   const fs::path report = cases_folder() / (list_name.substr(0, list_name.find(".edits")) + ".report") / "report.html";
   EXPECT_EQ(browser.source().toLocalFile().toStdString(), report.string());
   EXPECT_NE(test::content(report).find("landmark Left apex"), std::string::npos);
-  ASSERT_EQ(made->info().landmarks.size(), 2u);
+  ASSERT_EQ(made->info().landmarks.size(), 3u);
   EXPECT_EQ(made->info().landmarks[0].name, "Left apex");
   EXPECT_EQ(made->info().landmarks[1].name, "Right apex");
+  EXPECT_EQ(made->info().landmarks[2].name, "Greater trochanter");
   const Vec3 half = 0.5 * two_balls().spacing_mm + Vec3::Constant(0.2);  // and a pixel
   for (const int side : {1, -1}) {
     const Vec3 at = made->info().landmarks[side > 0 ? 0 : 1].point_mm;

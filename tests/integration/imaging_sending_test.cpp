@@ -1,10 +1,13 @@
 // From the kept bone of a CT to a case on a server: the server gets the bone that was chosen, and who cancels leaves
-// nothing.
+// nothing, unless somebody may need it.
 #include <gtest/gtest.h>
 
+#include <QCheckBox>
+#include <QDesktopServices>
 #include <QDialog>
 #include <QPushButton>
 #include <QTest>
+#include <QTextBrowser>
 #include <algorithm>
 #include <csignal>
 #include <filesystem>
@@ -42,6 +45,12 @@ class ImagingSendingTest : public test::SendingBench<test::ImagingBench> {
     press_send();
     ASSERT_TRUE(until([&] { return asks(); })) << said();
     EXPECT_TRUE(at_rest());
+  }
+  // The case that is there and was not before. Empty: none.
+  [[nodiscard]] static std::filesystem::path new_case(const std::set<std::string>& before) {
+    for (const std::string& name : test::names_in(cases_folder()))
+      if (!before.contains(name) && is_case(cases_folder() / name)) return cases_folder() / name;
+    return {};
   }
   void escape() { QTest::keyClick(&part<QDialog>("send_dialog"), Qt::Key_Escape); }
 };
@@ -106,6 +115,46 @@ TEST_F(ImagingSendingTest, WhoCancelsLeavesNothing) {
   window_.reset();
   const std::set<std::string> after = test::names_in(cases_folder());
   EXPECT_TRUE(std::ranges::includes(before, after)) << "its scratch files go, too";
+}
+
+TEST_F(ImagingSendingTest, ACaseThatSomebodyMayNeedStays) {
+  std::set<std::string> before = test::names_in(cases_folder());
+  part<QCheckBox>("with_report").click();
+  QTextBrowser browser;
+  QDesktopServices::setUrlHandler("file", &browser, "setSource");
+  make_to_send();
+  QDesktopServices::unsetUrlHandler("file");
+  const std::filesystem::path first = new_case(before);
+  ASSERT_FALSE(first.empty());
+  const std::string page = (report_folder(first) / "report.html").string();
+  EXPECT_EQ(browser.source().toLocalFile().toStdString(), page);
+  EXPECT_EQ(said(), "The bone is made. Its report is in " + page + ". Send the bone in the dialog.");
+  // From the menu, it is the same dialog. Another one would take the case away.
+  window_->send_case(cases_folder() / "." / first.filename());
+  EXPECT_TRUE(asks());
+  EXPECT_TRUE(is_case(first));
+  // The server has the case, and no room.
+  send(address_, "two words");
+  ASSERT_TRUE(until([&] { return at_rest(); })) << words();
+  EXPECT_NE(words().find("has the case, but did not open the room"), std::string::npos) << words();
+  escape();
+  EXPECT_FALSE(asks());
+  EXPECT_TRUE(is_case(first));
+  EXPECT_TRUE(is_file(edit_list_of(first)));
+  EXPECT_TRUE(is_file(page));
+
+  // Somebody opens it, and closes the dialog before its room is open.
+  before = test::names_in(cases_folder());
+  part<QCheckBox>("with_report").click();
+  make_to_send();
+  const std::filesystem::path second = new_case(before);
+  ASSERT_FALSE(second.empty());
+  EXPECT_NE(words().find("stays only if it is sent"), std::string::npos) << words();
+  window_->practise(cases_folder() / "." / second.filename());
+  EXPECT_EQ(words().find("stays only if it is sent"), std::string::npos) << words();
+  escape();
+  EXPECT_FALSE(asks());
+  EXPECT_TRUE(is_case(second));
 }
 
 }  // namespace

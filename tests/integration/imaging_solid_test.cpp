@@ -19,6 +19,7 @@
 #include <cstdlib>
 #include <memory>
 #include <optional>
+#include <vector>
 
 #include "tests/integration/imaging_bench.hpp"
 #include "viewer_client/desktop/imaging_solid.hpp"
@@ -226,6 +227,17 @@ TEST_F(ImagingSolidTest, ABoneHasTheTintOfThePlanesAndChoosesItsRow) {
   QTest::mouseClick(&view(), Qt::LeftButton, {}, QPoint(3, 3));
   EXPECT_NEAR(row_hue(), plane_hue(1), 5) << "there is no bone";
 
+  // A click on a surface that is older than the edits chooses nothing, and the words stay.
+  const int row = islands().currentRow();
+  islands().item(row)->setCheckState(Qt::Unchecked);
+  EXPECT_FALSE(solid().current());
+  const std::string said = words();
+  QTest::mouseClick(&view(), Qt::LeftButton, {}, pixel(beside(middle_of(1))));
+  EXPECT_EQ(islands().currentRow(), row);
+  EXPECT_EQ(words(), said);
+  QTest::keySequence(window_.get(), QKeySequence::Undo);
+  ASSERT_TRUE(until([&] { return shows(true, true); })) << words();
+
   // The bone of the ball on the patient's left fades in both pictures, and who does not see it cannot click it.
   auto& choice = part<QComboBox>("bone_choice");
   choice.setCurrentIndex(1);
@@ -258,6 +270,19 @@ TEST_F(ImagingSolidTest, MarksDifferInTheirShapes) {
   };
   const std::array<int, 3> seed = ball(1), outside{seed[0] + 5, seed[1], seed[2]}, painted{29, 29, seed[2]};
   click("tool_outside", outside);
+  // On the plane, the red pixels of a triangle: a point above, and a side below.
+  const QImage slice = axial.grab().toImage();
+  const QPoint middle = axial.pixel(outside);
+  std::vector<int> red_rows;
+  for (int y = middle.y() - 10; y <= middle.y() + 10; ++y) {
+    int red = 0;
+    for (int x = middle.x() - 10; x <= middle.x() + 10; ++x)
+      red += slice.valid(x, y) && QColor(slice.pixel(x, y)) == QColor(255, 60, 60) ? 1 : 0;
+    if (red > 0) red_rows.push_back(red);
+  }
+  ASSERT_GE(red_rows.size(), 7u);
+  EXPECT_LE(red_rows.front(), 3);
+  EXPECT_GE(red_rows.back(), 7);
   click("tool_paint", painted);
   part<QSlider>("slice_axial").setValue(3);  // the crosshair leaves the marks
   part<QSlider>("slice_sagittal").setValue(3);

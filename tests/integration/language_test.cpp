@@ -27,6 +27,8 @@
 #include <QToolButton>
 #include <algorithm>
 #include <chrono>
+#include <filesystem>
+#include <fstream>
 #include <map>
 #include <memory>
 #include <set>
@@ -402,6 +404,9 @@ TEST_F(LanguageTest, SentencesNameFieldsAndNoOptions) {
             "nothing listens at x:1; give in the field “Server, HOST:PORT” the address that it printed");
   EXPECT_EQ(with_fields("there is none; choose a lower --threshold or a smaller --pitch"),
             "there is none; choose a lower value in the field “Threshold”");
+  EXPECT_EQ(with_fields("--server nowhere is not HOST:PORT"), "the server nowhere is not HOST:PORT");
+  EXPECT_EQ(with_fields("see whether --server is right"), "see whether the field “Server, HOST:PORT” is right");
+  EXPECT_EQ(with_fields("/scans/a--server is empty"), "/scans/a--server is empty") << "a name of the user";
   // Of whoever runs the server.
   EXPECT_EQ(with_fields("this server takes no cases; start it with --uploads FOLDER"),
             "this server takes no cases; start it with --uploads FOLDER");
@@ -410,6 +415,19 @@ TEST_F(LanguageTest, SentencesNameFieldsAndNoOptions) {
   ASSERT_FALSE(half);
   const auto far = wire::channel_credentials({}, "192.0.2.1:1");
   ASSERT_FALSE(far);
+  // Folders that are taken for that of a person.
+  const std::filesystem::path certs = desk_->temp() / "certs", ticket = certs / "ticket";
+  for (const char* name : {"server", "authority/people"}) std::filesystem::create_directories(certs / name);
+  std::ofstream(certs / "server" / "server.key") << "key";
+  std::ofstream(ticket) << "ticket";
+  for (const char* name : {"server", "authority"}) {
+    const auto other = wire::client_credentials({.plain = false, .certificates = certs / name, .ticket = ticket});
+    ASSERT_FALSE(other);
+    const QString shown = sentence_of(other.error());
+    EXPECT_FALSE(shown.contains("--")) << shown.toStdString();
+    EXPECT_TRUE(shown.contains("give that of a person in the field “Folder of your certificate”"))
+        << shown.toStdString();
+  }
   speak("de");
   for (const Error& error : {half.error(), far.error()}) {
     const QString shown = sentence_of(error);

@@ -13,11 +13,15 @@
 #include <QSlider>
 #include <QTest>
 #include <QWheelEvent>
+#include <algorithm>
 #include <cmath>
 #include <csignal>
+#include <cstdint>
 #include <cstdlib>
+#include <memory>
 #include <numbers>
 #include <string>
+#include <utility>
 
 #include "common/radiology/attenuation.hpp"
 #include "tests/integration/window_bench.hpp"
@@ -299,6 +303,54 @@ TEST_F(SlicesTest, SayThatTheConnectionIsLost) {
   EXPECT_TRUE(shown());
   // The window starts the server again, with the session as it was.
   EXPECT_TRUE(until([&] { return label("slices_status").isEmpty(); })) << problem();
+}
+
+// A slice without a window round it.
+class SlicesTestAlone : public test::WindowBench {
+ protected:
+  void SetUp() override { ASSERT_TRUE(desk_->stands()) << "Xvfb, of Debian's package xvfb, did not start"; }
+  struct Columns {
+    int first = 1 << 20, last = -1;
+  };
+  // Of the words of an axis from the right to a target in this column.
+  [[nodiscard]] static Columns columns_of_words(std::int32_t target) {
+    constexpr std::int32_t kRow = 110, kStepsOfPixel = 1024;  // a pixel is 1 mm
+    SliceView::Events events;
+    events.resized = [] {};
+    SliceView view(events);
+    view.resize(260, 220);
+    SliceImage image;
+    image.plane.columns = view.width(), image.plane.rows = view.height();
+    image.hu.assign(image.plane.count(), 0.0F);
+    view.show_image(std::make_shared<const SliceImage>(std::move(image)), kBoneWindow);
+    Annotation axis;
+    axis.id = 1;
+    axis.kind = AnnotationKind::axis;
+    axis.points = {{240 * kStepsOfPixel, kRow * kStepsOfPixel, 0}, {target * kStepsOfPixel, kRow * kStepsOfPixel, 0}};
+    axis.words = "Nail 10";
+    axis.colour = 0x00ff00;
+    SliceOverlay overlay;
+    overlay.drawn = {axis};
+    view.show_overlay(overlay);
+    const QImage seen = view.grab().toImage();
+    Columns columns;
+    // Above the line and the bar across its end.
+    for (int y = kRow - 18; y < kRow - 8; ++y)
+      for (int x = 0; x < seen.width(); ++x) {
+        const QColor colour(seen.pixel(x, y));
+        if (colour.green() < std::max(colour.red(), colour.blue()) + 80) continue;
+        columns.first = std::min(columns.first, x), columns.last = std::max(columns.last, x);
+      }
+    return columns;
+  }
+};
+
+TEST_F(SlicesTestAlone, WordsOfAnAxisAreWholeAtTheEdge) {
+  const Columns free = columns_of_words(150), at_edge = columns_of_words(12);
+  ASSERT_GT(free.last, free.first);
+  EXPECT_LT(free.last, 150) << "they cover the axis";
+  EXPECT_GT(at_edge.first, 12);
+  EXPECT_NEAR(at_edge.last - at_edge.first, free.last - free.first, 2);
 }
 
 }  // namespace

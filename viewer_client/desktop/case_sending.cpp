@@ -14,7 +14,6 @@ namespace osteon {
 namespace {
 constexpr auto kReachPatience = std::chrono::seconds(10);  // for the connection
 constexpr const char* kArchive = "case.osteon";
-
 }  // namespace
 
 // StaleFiles knows a folder of this name as that of a program that was killed.
@@ -25,9 +24,7 @@ CaseSending::CaseSending(std::filesystem::path what, RoomAddress to, Events even
       scratch_(cases_folder() / (".partial-send-" + std::to_string(QCoreApplication::applicationPid()))) {}
 
 CaseSending::~CaseSending() {
-  cancelled_ = true;
-  packer_.reset();
-  if (thread_.joinable()) thread_.join();
+  stop();
   std::error_code ignored;
   std::filesystem::remove_all(scratch_, ignored);
 }
@@ -37,6 +34,12 @@ void CaseSending::start() { is_file(what_) ? send(what_) : pack(); }
 void CaseSending::cancel() {
   cancelled_ = true;
   if (packer_) packer_->cancel();
+}
+
+void CaseSending::stop() {
+  cancelled_ = true;
+  packer_.reset();
+  if (thread_.joinable()) thread_.join();
 }
 
 void CaseSending::fail(const QString& sentence) { events_.failed(cancelled_ ? QString() : sentence); }
@@ -106,6 +109,9 @@ void CaseSending::work(const std::filesystem::path& archive) {
   if (!channel) return failed(channel.error());
   show(Stage::sending);
   const auto stored = wire::upload_case(*channel, archive, keep_going());
+  const bool unanswered =
+      !stored && (stored.error().code == ErrorCode::cancelled || stored.error().code == ErrorCode::unavailable);
+  server_may_have_it_ = stored || (unanswered && shown_ == Stage::checking);
   if (!stored) return failed(stored.error());
   if (!to_.room.isEmpty()) return open_room(*channel, stored->hash);
   in_gui([this, known = stored->known] {

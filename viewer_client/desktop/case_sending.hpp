@@ -17,7 +17,7 @@
 
 namespace osteon {
 
-// [GUI thread] Its destructor cancels, and waits until the server is let go.
+// [GUI thread] Its destructor stops it.
 class CaseSending : public QObject {
   Q_DECLARE_TR_FUNCTIONS(CaseSending)
 
@@ -37,6 +37,10 @@ class CaseSending : public QObject {
   void start();
   // Then `failed` tells so.
   void cancel();
+  // Cancels, and waits until the server is let go.
+  void stop();
+  // After stop(), or within `sent` or `failed`: the server has the case, or it had all of it and gave no answer.
+  [[nodiscard]] bool server_may_have_it() const { return server_may_have_it_; }
 
  private:
   void pack();
@@ -56,7 +60,7 @@ class CaseSending : public QObject {
   const Events events_;
   const std::filesystem::path scratch_;  // folder of the packed case; it goes with this object
   std::unique_ptr<ImporterRun> packer_;
-  std::atomic<bool> cancelled_{false};
+  std::atomic<bool> cancelled_{false}, server_may_have_it_{false};
   Stage shown_ = Stage::packing;  // the own thread's, as the next one
   int percent_ = -1;
   std::thread thread_;

@@ -1,6 +1,7 @@
 #include "viewer_client/desktop/field_sentences.hpp"
 
 #include <QCoreApplication>
+#include <QRegularExpression>
 #include <cstddef>
 #include <iterator>
 
@@ -8,8 +9,9 @@ namespace osteon {
 
 namespace {
 
-// The sentences are English, so what is written is, too. %1 to %5 are the fields, as kFields has them. The first rule
-// that fits wins, so the longer ones come first.
+// The sentences are English, so what is written is, too. %1 to %5 are the fields, as kFields has them. Longer rules
+// come first, since each is applied to what the others have left. An option begins a word: names of files may contain
+// it.
 struct FieldRule {
   const char *found, *written;
 };
@@ -24,9 +26,11 @@ constexpr FieldRule kFieldRules[] = {
      "empty the fields %2 and %3, or have the server started with certificates"},
     {"give --certificates DIR with --ticket FILE", "fill in the fields %2 and %3"},
     {"give with --certificates", "give in the field %2"},
+    {"of a person with --certificates", "of a person in the field %2"},
     {"with --server", "in the field %1"},
     {"in --server", "in the field %1"},
-    {"--server", "the field %1"},
+    {"whether --server is", "whether the field %1 is"},
+    {"--server ", "the server "},
     // osteon-import
     {", or take another series by --series N", ", or choose another series"},
     {", --spacing for PNG slices, or --size too for raw numbers", ""},
@@ -58,7 +62,8 @@ QString with_fields(const QString& sentence) {
     for (std::size_t i = 0; i < std::size(kFields); ++i)
       written.replace('%' + QString::number(i + 1),
                       "“" + QCoreApplication::translate(kFields[i].context, kFields[i].words) + "”");
-    shown.replace(rule.found, written);
+    const QString found = QRegularExpression::escape(rule.found);
+    shown.replace(QRegularExpression(found.startsWith("\\-") ? "(?<!\\S)" + found : found), written);
   }
   return shown;
 }

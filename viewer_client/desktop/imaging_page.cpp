@@ -471,6 +471,8 @@ void ImagingPage::point_at(const std::array<int, 3>& voxel) {
 }
 
 void ImagingPage::choose_part(int bone, const std::array<int, 3>& voxel) {
+  // An older surface has the bones of other edits, and the words are those of the work.
+  if (steps_.busy() || !solid_->current()) return;
   const int island = island_near(scene_.scan.geometry, scene_.islands, scene_.look.kept, bone, voxel);
   const auto part = std::ranges::find(islands_, island, &ListedIsland::number);
   if (part == islands_.end()) return words_->setText(tr("This bone is painted, so no part of the list is its own."));

@@ -44,8 +44,9 @@ class ImagingPage : public QWidget {
     std::function<void(bool busy)> busy;  // a case is being made
     // `said`: where the report is, if there is one.
     std::function<void(const std::filesystem::path& bone, const QString& said)> made;
-    std::function<bool()> may_send;                               // now; if not, it has told why
-    std::function<void(const std::filesystem::path& bone)> send;  // it was made for that
+    std::function<bool()> may_send;  // now; if not, it has told why
+    // It was made for that. Returns what the user does next.
+    std::function<QString(const std::filesystem::path& bone)> send;
     std::function<void()> leave;
   };
   explicit ImagingPage(Events events, QWidget* parent = nullptr);

@@ -346,12 +346,9 @@ void ImagingPage::make_and_send() {
 
 void ImagingPage::use_made(const std::filesystem::path& bone) {
   events_.busy(false);
-  if (std::exchange(sends_made_, false)) {
-    end_work(tr("The bone is made. Send it in the dialog."));
-    return events_.send(bone);
-  }
   const QString said = show_report(bone);
   end_work(said);
+  if (std::exchange(sends_made_, false)) return words_->setText(said + ' ' + events_.send(bone));
   events_.made(bone, said);
 }
 

@@ -228,7 +228,7 @@ void ImagingSolid::show_marks(bool all) {
   for (const ImagingScene::SeedMark& seed : scene_.seeds)
     now[static_cast<std::size_t>(seed.outside ? SolidMark::outside : SolidMark::seed)].push_back(
         centre_of(scene_.scan.geometry, seed.voxel));
-  now[static_cast<std::size_t>(SolidMark::scribble)] = painted_points(scene_.look.corrections, 2.0 * mark_mm_);
+  now[static_cast<std::size_t>(SolidMark::paint)] = painted_points(scene_.look.corrections, 2.0 * mark_mm_);
   for (std::size_t kind = 0; kind < now.size(); ++kind) {
     if (!all && now[kind] == marks_[kind]) continue;
     marks_[kind] = std::move(now[kind]);

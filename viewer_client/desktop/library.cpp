@@ -95,9 +95,11 @@ std::filesystem::path report_folder(const std::filesystem::path& bone) { return 
 std::filesystem::path edit_list_of(const std::filesystem::path& bone) { return bone.string() + ".edits.yaml"; }
 
 void remove_unused_case(const std::filesystem::path& bone) {
-  const std::vector<std::filesystem::path> needed = remembered_bones();
-  if (std::ranges::find(needed, bone) != needed.end()) return;
   std::error_code ignored;
+  const auto is_it = [&](const std::filesystem::path& needed) {
+    return needed == bone || std::filesystem::equivalent(needed, bone, ignored);
+  };
+  if (std::ranges::any_of(remembered_bones(), is_it)) return;
   for (const std::filesystem::path& part : {bone, edit_list_of(bone), report_folder(bone)})
     std::filesystem::remove_all(part, ignored);
 }

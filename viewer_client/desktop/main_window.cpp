@@ -303,6 +303,7 @@ void MainWindow::enable_opening(bool on) {
 void MainWindow::practise(const std::filesystem::path& bone, const std::filesystem::path& session,
                           const QString& name) {
   leave_room();
+  if (sender_) sender_->keep(bone);  // the start page knows a case only when its room is open
   PracticeOptions options;
   options.bone = bone;
   options.folder = session.empty() ? new_session_folder(bone) : session;

@@ -61,10 +61,11 @@ class MainWindow : public QMainWindow {
   // its end; closed once more, it leaves the file as it was.
   void save_case_file(const QString& file);
   // Opens the dialog that sends a case to a server. `what`: the folder of a case, or a file with one. A dialog that is
-  // at work stays instead.
+  // at work, or has this case, stays instead.
   void send_case(const std::filesystem::path& what);
-  // The same for a case that image processing has made to be sent: it stays on this computer only if it is sent.
-  void send_made_case(const std::filesystem::path& bone);
+  // The same for a case that image processing has made to be sent: it stays on this computer only if it is sent. While
+  // another one is being sent, it stays, and no dialog opens for it. Returns what the user does next.
+  QString send_made_case(const std::filesystem::path& bone);
   void open_example(const ExampleBone& bone);
   void join(const RoomAddress& room);
   // Joins, but only to look: no tool can be taken, and nothing be placed or undone. The view follows the work.
@@ -125,6 +126,7 @@ class MainWindow : public QMainWindow {
   void open_send_dialog(const std::filesystem::path& what, const QString& title, bool stays);
   // A case is being sent: says so, and shows its dialog.
   bool sends_already();
+  void raise_sender();
   void choose_room();
   void enter_room(const RoomAddress& room);
   void leave_room();

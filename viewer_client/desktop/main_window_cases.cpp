@@ -127,7 +127,7 @@ void MainWindow::make_imaging_page() {
                                 say(said);
                               },
                               [this] { return !sends_already(); },
-                              [this](const std::filesystem::path& bone) { send_made_case(bone); },
+                              [this](const std::filesystem::path& bone) { return send_made_case(bone); },
                               [this] { pages_->setCurrentWidget(start_); }});
   pages_->addWidget(imaging_);
   connect(pages_, &QStackedWidget::currentChanged, this, [this] { lay_out_page(); });
@@ -163,10 +163,14 @@ void MainWindow::choose_case() {
 bool MainWindow::sends_already() {
   if (!sender_ || !sender_->sending()) return false;
   say(tr("Another case is being sent. Try again when that is done."));
+  raise_sender();
+  return true;
+}
+
+void MainWindow::raise_sender() {
   sender_->show();
   sender_->raise();
   sender_->activateWindow();
-  return true;
 }
 
 void MainWindow::choose_case_to_send() {
@@ -178,14 +182,20 @@ void MainWindow::choose_case_to_send() {
 
 void MainWindow::send_case(const std::filesystem::path& what) {
   if (sends_already()) return;
+  // A new dialog would take the place of that one, which removes a case that is not sent when it goes.
+  if (sender_ && sender_->isVisible() && sender_->holds(what)) return raise_sender();
   open_send_dialog(what, is_file(what) ? text_of(what.filename()) : case_title(what), true);
 }
 
-void MainWindow::send_made_case(const std::filesystem::path& bone) {
+QString MainWindow::send_made_case(const std::filesystem::path& bone) {
   // Begun from the menu while the case was made. That work is not thrown away.
-  if (sends_already())
-    return say(tr("Another case is being sent. The new one is in %1; send it after that.").arg(text_of(bone)));
+  if (sends_already()) {
+    const QString next = tr("Another case is being sent. The new one is in %1; send it after that.").arg(text_of(bone));
+    say(next);
+    return next;
+  }
   open_send_dialog(bone, case_title(bone), false);
+  return tr("Send the bone in the dialog.");
 }
 
 void MainWindow::open_send_dialog(const std::filesystem::path& what, const QString& title, bool stays) {
@@ -194,9 +204,7 @@ void MainWindow::open_send_dialog(const std::filesystem::path& what, const QStri
   };
   sender_ = std::make_unique<SendDialog>(what, title, stays ? SendDialog::Stays::always : SendDialog::Stays::if_sent,
                                          ended, this);
-  sender_->show();
-  sender_->raise();
-  sender_->activateWindow();
+  raise_sender();
 }
 
 void MainWindow::open_case_file(const std::filesystem::path& file) {

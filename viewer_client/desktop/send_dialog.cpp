@@ -6,6 +6,7 @@
 #include <QProgressBar>
 #include <QPushButton>
 #include <QVBoxLayout>
+#include <system_error>
 #include <utility>
 
 #include "viewer_client/desktop/enabled.hpp"
@@ -49,13 +50,29 @@ SendDialog::SendDialog(std::filesystem::path what, const QString& title, Stays s
   connect(close_, &QPushButton::clicked, this, [this] { reject(); });
   all->addWidget(buttons);
   QString first = tr("The server checks the case and keeps it. Whoever may open rooms there can send it.");
-  if (drops_) first += ' ' + tr("On this computer the case stays only if it is sent.");
+  if (drops_) first += ' ' + stays_if_sent();
   end(first);
 }
 
+QString SendDialog::stays_if_sent() { return tr("On this computer the case stays only if it is sent."); }
+
 SendDialog::~SendDialog() {
-  sending_.reset();  // it reads the case
+  if (sending_) {
+    sending_->stop();  // it reads the case
+    drops_ = drops_ && !sending_->server_may_have_it();
+  }
   drop_unsent();
+}
+
+bool SendDialog::holds(const std::filesystem::path& what) const {
+  std::error_code ignored;
+  return std::filesystem::equivalent(what, what_, ignored);
+}
+
+void SendDialog::keep(const std::filesystem::path& bone) {
+  if (!drops_ || !holds(bone)) return;
+  drops_ = false;
+  words_->setText(words_->text().remove(stays_if_sent()).trimmed());
 }
 
 void SendDialog::drop_unsent() {
@@ -87,7 +104,6 @@ void SendDialog::send() {
                           [this](const QString& sentence, const QString& room) {
                             if (!room.isEmpty()) remember_field("room", room);  // where "Join a room" goes next
                             room_->clear();
-                            drops_ = false;
                             end(sentence);
                             ended_(true);
                           },
@@ -119,7 +135,10 @@ void SendDialog::show_stage(CaseSending::Stage stage) {
 }
 
 void SendDialog::end(const QString& sentence) {
-  if (sending_) sending_.release()->deleteLater();  // it is still in its event
+  if (sending_) {
+    drops_ = drops_ && !sending_->server_may_have_it();
+    sending_.release()->deleteLater();  // it is still in its event
+  }
   words_->setText(sentence);
   progress_->hide();
   enable_parts();

@@ -24,13 +24,16 @@ class SendDialog : public QDialog {
  public:
   enum class Stays { always, if_sent };  // the case, on this computer
   // `what`: the folder of a case, or a file with one. `title`: for people. A case that stays if it is sent goes with
-  // the dialog, or when that is closed, together with its edit list and its report.
+  // the dialog, or when that is closed, together with its edit list and its report. It stays if a server may have it.
   // `ended`: after each sending; `sent`: it went well.
   SendDialog(std::filesystem::path what, const QString& title, Stays stays, std::function<void(bool sent)> ended,
              QWidget* parent);
   ~SendDialog() override;
 
   [[nodiscard]] bool sending() const { return sending_ != nullptr; }
+  [[nodiscard]] bool holds(const std::filesystem::path& what) const;
+  // Somebody opens a case. If it is the one of this dialog, it stays.
+  void keep(const std::filesystem::path& bone);
   // Cancels what is sent. Closes the dialog if nothing is.
   void reject() override;
 
@@ -38,6 +41,7 @@ class SendDialog : public QDialog {
   void send();
   void show_stage(CaseSending::Stage stage);
   void end(const QString& sentence);
+  [[nodiscard]] static QString stays_if_sent();
   // A case that stays if it is sent, and was not.
   void drop_unsent();
   void enable_parts();

@@ -195,12 +195,13 @@ void SliceView::paint_drawn(QPainter& painter) const {
     for (const std::size_t end : {std::size_t{0}, std::size_t{1}})
       if (std::abs(depth_mm(plane, points[end])) <= kEndDepth_mm)
         painter.fillRect(QRectF(place_of(points[end]) - QPointF(3.5, 3.5), QSizeF(7, 7)), colour);
-    // The words of an axis that comes from the right are on its left, so that they do not cover it.
+    // The words of an axis that comes from the right are on its left, so that they do not cover it, if there is room.
+    const QString words = QString::fromStdString(one.words);
     const QSize size(width(), 16);
-    const bool on_left = one.kind == AnnotationKind::axis && first.x() > second.x();
+    const bool has_room = second.x() - 8 >= painter.fontMetrics().horizontalAdvance(words);
+    const bool on_left = one.kind == AnnotationKind::axis && first.x() > second.x() && has_room;
     write_outlined(painter, QRect(second.toPoint() + QPoint(on_left ? -8 - size.width() : 8, -18), size),
-                   (on_left ? Qt::AlignRight : Qt::AlignLeft) | Qt::AlignVCenter, QString::fromStdString(one.words),
-                   colour);
+                   (on_left ? Qt::AlignRight : Qt::AlignLeft) | Qt::AlignVCenter, words, colour);
   }
   if (!overlay_.begun) return;
   painter.setPen(QPen(QColor(kPlannedColour), 2.0));

@@ -31,7 +31,9 @@ SolidView::SolidView(Events events, QWidget* parent) : QVTKOpenGLNativeWidget(pa
   setObjectName("solid_view");
   setAccessibleName(tr("Three dimensions"));
   setFocusPolicy(Qt::StrongFocus);
-  setToolTip(tr("Click: a bone's row. Double click, Enter: crosshair too. Drag: turn. Wheel: nearer. Home: all."));
+  setToolTip(tr("A click chooses the bone in the list.") + '\n' +
+             tr("A double click or Enter moves the crosshair too.") + '\n' +
+             tr("A drag turns the picture, the wheel brings it nearer, and Home shows all."));
   frame_timer_.setSingleShot(true);
   connect(&frame_timer_, &QTimer::timeout, this, [this] { draw(); });
   rest_timer_.setSingleShot(true);

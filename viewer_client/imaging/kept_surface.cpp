@@ -73,10 +73,6 @@ std::vector<std::array<float, 3>> normals_of(const TriangleMesh& mesh) {
   return normals;
 }
 
-}  // namespace
-
-namespace {
-
 // The bone of each block, columns fastest.
 Result<VoxelFile<std::uint8_t>> bones_of_blocks(const ScanGeometry& scan, const ScanBlocks& blocks, KeptSlices& slices,
                                                 const KeepGoing& keep_going) {

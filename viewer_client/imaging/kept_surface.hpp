@@ -18,8 +18,9 @@ struct KeptSurface {
 // The surfaces of the voxels that the planes show as kept (corrected_plane()), within the box, at the resolution of
 // reduced_scan(), by the bone whose tint they have there (shown_bone()), lowest first. A block is solid if a quarter of
 // it is kept, so that thin bone is not lost; it is of the bone that has most of it. Each surface is closed, bone frame,
-// mm, with normals. It holds a byte for each block. `keep_going` is asked before each slice of the scan and each
-// surface. Errors: cancelled, exhausted (too many triangles).
+// mm, with normals. It holds a byte for each block, and 4 bytes for each bone and block of one slice of blocks.
+// `keep_going` is asked before each slice of the scan and each surface. Errors: cancelled, exhausted (too many
+// triangles).
 [[nodiscard]] Result<std::vector<KeptSurface>> kept_surfaces(const ScanGeometry& scan, const IslandMap& islands,
                                                              const KeptParts& kept, const KeepGoing& keep_going);
 

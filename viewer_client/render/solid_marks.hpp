@@ -11,8 +11,8 @@ namespace osteon {
 
 class LayerAbove;
 
-// Seed: a ball. Scribble: a star of three bars. Outside: a pyramid with three sides, which points to the head.
-enum class SolidMark : std::uint8_t { seed, scribble, outside };
+// Seed: a ball. Paint: a star of three bars. Outside: a pyramid with three sides, which points to the head.
+enum class SolidMark : std::uint8_t { seed, paint, outside };
 
 class SolidMarks {
  public:

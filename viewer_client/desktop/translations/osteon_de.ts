@@ -1213,10 +1213,6 @@
         <translation>Macht aus den behaltenen Knochen einen Fall und öffnet den Dialog, der ihn sendet</translation>
     </message>
     <message>
-        <source>The bone is made. Send it in the dialog.</source>
-        <translation>Der Knochen ist fertig. Senden Sie ihn im Dialog.</translation>
-    </message>
-    <message>
         <source>This bone is painted, so no part of the list is its own.</source>
         <translation>Dieser Knochen ist gemalt, darum gehört ihm kein Teil der Liste.</translation>
     </message>
@@ -2052,6 +2048,10 @@
         <source>Another case is being sent. The new one is in %1; send it after that.</source>
         <translation>Ein anderer Fall wird gerade gesendet. Der neue liegt in %1; senden Sie ihn danach.</translation>
     </message>
+    <message>
+        <source>Send the bone in the dialog.</source>
+        <translation>Senden Sie den Knochen im Dialog.</translation>
+    </message>
 </context>
 <context>
     <name>OthersShots</name>
@@ -2726,8 +2726,16 @@
         <translation>Drei Dimensionen</translation>
     </message>
     <message>
-        <source>Click: a bone's row. Double click, Enter: crosshair too. Drag: turn. Wheel: nearer. Home: all.</source>
-        <translation>Klick: Zeile. Doppelklick, Eingabe: auch Fadenkreuz. Ziehen: drehen. Pos1: alles.</translation>
+        <source>A click chooses the bone in the list.</source>
+        <translation>Ein Klick wählt den Knochen in der Liste.</translation>
+    </message>
+    <message>
+        <source>A double click or Enter moves the crosshair too.</source>
+        <translation>Ein Doppelklick oder die Eingabetaste bewegt auch das Fadenkreuz.</translation>
+    </message>
+    <message>
+        <source>A drag turns the picture, the wheel brings it nearer, and Home shows all.</source>
+        <translation>Ziehen dreht das Bild, das Rad holt es näher, und Pos1 zeigt alles.</translation>
     </message>
 </context>
 <context>
