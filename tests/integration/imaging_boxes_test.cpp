@@ -12,12 +12,16 @@
 #include <QSpinBox>
 #include <QTest>
 #include <algorithm>
+#include <chrono>
 #include <cstdlib>
+#include <system_error>
+#include <vector>
 
 #include "common/geometry/lattice.hpp"
 #include "common/runtime/files.hpp"
 #include "tests/integration/imaging_bench.hpp"
 #include "tests/support/process.hpp"
+#include "tests/support/wait.hpp"
 #include "viewer_client/desktop/imaging_solid.hpp"
 #include "viewer_client/desktop/library.hpp"
 
@@ -25,6 +29,7 @@ namespace osteon {
 namespace {
 
 namespace fs = std::filesystem;
+using namespace std::chrono_literals;
 
 constexpr CoordBox kFootOfBone{{8, 6, 2}, {27, 25, 7}}, kNotchInFoot{{18, 16, 2}, {27, 25, 7}},
     kShaftOfBone{{8, 6, 8}, {13, 11, 21}}, kBlockBeside{{34, 30, 12}, {36, 32, 14}};
@@ -193,8 +198,26 @@ TEST_F(ImagingBoxesTest, TheFilesAreThoseOfTheImporter) {
   ASSERT_TRUE(until([&] { return words() == "Cancelled. Nothing was written."; })) << words();
   EXPECT_EQ(label("sub_volumes_work").toStdString(), words());
   EXPECT_FALSE(part<QPushButton>("cancel_sub_volumes").isVisible());
-  const std::string scratch = ".partial-imaging-" + std::to_string(QCoreApplication::applicationPid());
-  EXPECT_FALSE(fs::exists(cases_folder() / scratch / "kept.nrrd"));
+  const fs::path scratch = cases_folder() / (".partial-imaging-" + std::to_string(QCoreApplication::applicationPid()));
+  EXPECT_FALSE(fs::exists(scratch / "kept.nrrd"));
+
+  // Cancelled after osteon-import has ended, and before the window knows it.
+  write(to);
+  std::vector<pid_t> importers;
+  ASSERT_TRUE(test::wait_until(
+      [&] {
+        QCoreApplication::processEvents();
+        importers = test::children("osteon-import");
+        return !importers.empty();
+      },
+      30s));
+  const std::string program = "/proc/" + std::to_string(importers.front()) + "/exe";  // goes when the process ends
+  std::error_code ignored;
+  ASSERT_TRUE(test::wait_until([&] { return !fs::exists(program, ignored); }, 60s));
+  EXPECT_TRUE(fs::exists(to / "sub-volumes"));
+  QTest::mouseClick(&part<QPushButton>("imaging_cancel"), Qt::LeftButton);
+  ASSERT_TRUE(until([&] { return words() == "Cancelled. Nothing was written."; })) << words();
+  EXPECT_TRUE(fs::is_empty(to));
   EXPECT_TRUE(fs::is_empty(to));
   write(to);
   ASSERT_TRUE(until([&] { return words() == "The root sub-volumes are in " + (to / "sub-volumes").string() + "."; }))
