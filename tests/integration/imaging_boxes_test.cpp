@@ -2,6 +2,7 @@
 // boxes, and the files are those of osteon-import.
 #include <gtest/gtest.h>
 
+#include <QCoreApplication>
 #include <QDialog>
 #include <QLabel>
 #include <QListWidget>
@@ -11,18 +12,24 @@
 #include <QSpinBox>
 #include <QTest>
 #include <algorithm>
+#include <chrono>
 #include <cstdlib>
+#include <system_error>
+#include <vector>
 
 #include "common/geometry/lattice.hpp"
 #include "common/runtime/files.hpp"
 #include "tests/integration/imaging_bench.hpp"
 #include "tests/support/process.hpp"
+#include "tests/support/wait.hpp"
 #include "viewer_client/desktop/imaging_solid.hpp"
+#include "viewer_client/desktop/library.hpp"
 
 namespace osteon {
 namespace {
 
 namespace fs = std::filesystem;
+using namespace std::chrono_literals;
 
 constexpr CoordBox kFootOfBone{{8, 6, 2}, {27, 25, 7}}, kNotchInFoot{{18, 16, 2}, {27, 25, 7}},
     kShaftOfBone{{8, 6, 8}, {13, 11, 21}}, kBlockBeside{{34, 30, 12}, {36, 32, 14}};
@@ -67,16 +74,20 @@ class ImagingBoxesTest : public test::ImagingBench {
   [[nodiscard]] std::string said() const { return label("sub_volumes_words").toStdString() + "; " + words(); }
   [[nodiscard]] bool says(const QString& text) const { return label("sub_volumes_words").contains(text); }
   [[nodiscard]] QListWidget& sections() const { return part<QListWidget>("sections"); }
-  // The colour of the line between two neighbours of a row in the axial plane; black, if there is no line of a section.
-  [[nodiscard]] QColor line_between(const std::array<int, 3>& a, const std::array<int, 3>& b) const {
-    ImagingPlane& axial = plane("plane_axial");
-    const QImage image = axial.grab().toImage();
-    const QPoint middle = (axial.pixel(a) + axial.pixel(b)) / 2;
-    for (int x = -2; x <= 2; ++x) {
-      const QColor colour = image.pixelColor(middle + QPoint(x, 0));
-      for (const auto& [red, green, blue] : {kSectionColour, kChosenColour})
-        if (colour == QColor(red, green, blue)) return colour;
-    }
+  // The colour of the line between two neighbours in a plane; black, if there is no line of a section. Dashes of the
+  // bounding box may lie on it.
+  [[nodiscard]] QColor line_between(const std::array<int, 3>& a, const std::array<int, 3>& b,
+                                    const char* name = "plane_axial") const {
+    ImagingPlane& of = plane(name);
+    const QImage image = of.grab().toImage();
+    const QPoint from = of.pixel(a), to = of.pixel(b), middle = (from + to) / 2;
+    const bool upright = std::abs(to.x() - from.x()) > std::abs(to.y() - from.y());
+    for (int across = -2; across <= 2; ++across)
+      for (int along = -4; along <= 4; ++along) {
+        const QColor colour = image.pixelColor(middle + (upright ? QPoint(across, along) : QPoint(along, across)));
+        for (const auto& [red, green, blue] : {kSectionColour, kChosenColour})
+          if (colour == QColor(red, green, blue)) return colour;
+      }
     return Qt::black;
   }
   // The chosen section in three dimensions: how many pixels have its colour, and the highest of their rows.
@@ -129,6 +140,8 @@ TEST_F(ImagingBoxesTest, AreThoseOfAKnownBoneAndFollowIt) {
   ASSERT_EQ(sections().count(), 2);
   EXPECT_EQ(sections().currentRow(), 0);
   EXPECT_EQ(line_between({27, 20, 4}, {28, 20, 4}), kOrange);
+  EXPECT_EQ(line_between({10, 20, 7}, {10, 20, 8}, "plane_sagittal"), kOrange);
+  EXPECT_EQ(line_between({27, 8, 4}, {28, 8, 4}, "plane_coronal"), kOrange);
   ASSERT_TRUE(until([&] { return orange().pixels > 40; }));
   const int top_of_foot = orange().top;
   QTest::mouseClick(sections().viewport(), Qt::LeftButton, {}, sections().visualItemRect(sections().item(1)).center());
@@ -157,6 +170,17 @@ TEST_F(ImagingBoxesTest, AreThoseOfAKnownBoneAndFollowIt) {
   EXPECT_EQ(sections().count(), 4);
   QTest::keySequence(&sections(), QKeySequence::Undo);
   ASSERT_TRUE(until([&] { return says("Section boxes: 2,"); })) << said();
+  // A spin box has keys of its own for these.
+  QTest::keySequence(&subdivisions, QKeySequence::Redo);
+  ASSERT_TRUE(until([&] { return says("Section boxes: 4,"); })) << said();
+  QTest::keySequence(&subdivisions, QKeySequence::Undo);
+  ASSERT_TRUE(until([&] { return says("Section boxes: 2,"); })) << said();
+
+  // With another threshold, the old boxes go at once.
+  part<QSpinBox>("threshold").setValue(300);
+  EXPECT_TRUE(says("The parts of bone are not known yet.")) << said();
+  EXPECT_EQ(sections().count(), 0);
+  ASSERT_TRUE(until([&] { return says("Section boxes: 2,"); })) << said();
 
   // Closed, it shows nothing.
   part<QSlider>("slice_axial").setValue(4);
@@ -169,12 +193,36 @@ TEST_F(ImagingBoxesTest, TheFilesAreThoseOfTheImporter) {
   const fs::path to = desk_->temp() / "files";
   fs::create_directories(to);
   write(to);
+  EXPECT_EQ(label("sub_volumes_work").toStdString(), "Writing the root sub-volumes");
+  QTest::mouseClick(&part<QPushButton>("cancel_sub_volumes"), Qt::LeftButton);
+  ASSERT_TRUE(until([&] { return words() == "Cancelled. Nothing was written."; })) << words();
+  EXPECT_EQ(label("sub_volumes_work").toStdString(), words());
+  EXPECT_FALSE(part<QPushButton>("cancel_sub_volumes").isVisible());
+  const fs::path scratch = cases_folder() / (".partial-imaging-" + std::to_string(QCoreApplication::applicationPid()));
+  EXPECT_FALSE(fs::exists(scratch / "kept.nrrd"));
+
+  // Cancelled after osteon-import has ended, and before the window knows it.
+  write(to);
+  std::vector<pid_t> importers;
+  ASSERT_TRUE(test::wait_until(
+      [&] {
+        QCoreApplication::processEvents();
+        importers = test::children("osteon-import");
+        return !importers.empty();
+      },
+      30s));
+  const std::string program = "/proc/" + std::to_string(importers.front()) + "/exe";  // goes when the process ends
+  std::error_code ignored;
+  ASSERT_TRUE(test::wait_until([&] { return !fs::exists(program, ignored); }, 60s));
+  EXPECT_TRUE(fs::exists(to / "sub-volumes"));
   QTest::mouseClick(&part<QPushButton>("imaging_cancel"), Qt::LeftButton);
   ASSERT_TRUE(until([&] { return words() == "Cancelled. Nothing was written."; })) << words();
+  EXPECT_TRUE(fs::is_empty(to));
   EXPECT_TRUE(fs::is_empty(to));
   write(to);
   ASSERT_TRUE(until([&] { return words() == "The root sub-volumes are in " + (to / "sub-volumes").string() + "."; }))
       << words();
+  EXPECT_EQ(label("sub_volumes_work").toStdString(), words());
 
   // Of the scan, that takes the largest bone. It is the one that is kept.
   const fs::path again = desk_->temp() / "files-again";
@@ -188,6 +236,9 @@ TEST_F(ImagingBoxesTest, TheFilesAreThoseOfTheImporter) {
   }
   EXPECT_NE(read_file(to / "sub-volumes" / "SBB1.dat")->find("DIMENSIONS 20 20 6\nSPACING 0.9 0.9 1.5\n"),
             std::string::npos);
+  const std::string shaft = *read_file(to / "sub-volumes" / "SBB2.dat");
+  EXPECT_NE(shaft.find("DIMENSIONS 6 6 14\n"), std::string::npos);
+  EXPECT_NE(shaft.find("DATA NUMBER 504\n"), std::string::npos);
   for (const char* name : {"SBB3.dat", "report.txt", "report.json", "boxes.png"})
     EXPECT_EQ(fs::exists(to / "sub-volumes" / name), name != std::string("SBB3.dat")) << name;
 

@@ -4,9 +4,11 @@
 #include <QFileDialog>
 #include <QFormLayout>
 #include <QHideEvent>
+#include <QKeyEvent>
 #include <QLabel>
 #include <QListWidget>
 #include <QLocale>
+#include <QProgressBar>
 #include <QPushButton>
 #include <QSignalBlocker>
 #include <QSpinBox>
@@ -27,7 +29,7 @@ constexpr QSize kFirstSize{440, 420};
 
 QString count_text(std::int64_t count) { return QLocale().toString(static_cast<qlonglong>(count)); }
 
-QString part_text(std::int64_t voxels, const ScanGeometry& scan) {
+QString percent_text(std::int64_t voxels, const ScanGeometry& scan) {
   return QLocale().toString(100.0 * static_cast<double>(voxels) / static_cast<double>(scan.count()), 'f', 2);
 }
 
@@ -36,18 +38,23 @@ QString boxes_text(const KeptBoxes& boxes, const ScanGeometry& scan) {
   const Coord dims = boxes.object.dims();
   const std::int64_t object = subvolumes::voxels_of(boxes.object), full = boxes.full_leaves();
   const auto leaves = static_cast<std::int64_t>(boxes.leaves.size());
-  return QCoreApplication::translate("ImagingBoxes", "Bounding box: %1 × %2 × %3, %4 voxels, %5 % of the scan")
-             .arg(dims.x)
-             .arg(dims.y)
-             .arg(dims.z)
-             .arg(count_text(object), part_text(object, scan)) +
-         '\n' +
-         QCoreApplication::translate("ImagingBoxes", "Section boxes: %1, %2 voxels, %3 % of the scan")
-             .arg(boxes.sections.size())
-             .arg(count_text(boxes.section_voxels()), part_text(boxes.section_voxels(), scan)) +
-         '\n' +
-         QCoreApplication::translate("ImagingBoxes", "Leaves: %1, of which %2 are full and %3 partly full")
-             .arg(count_text(leaves), count_text(full), count_text(leaves - full));
+  QString text = QCoreApplication::translate("ImagingBoxes", "Bounding box: %1 × %2 × %3, %4 voxels, %5 % of the scan")
+                     .arg(dims.x)
+                     .arg(dims.y)
+                     .arg(dims.z)
+                     .arg(count_text(object), percent_text(object, scan)) +
+                 '\n' +
+                 QCoreApplication::translate("ImagingBoxes", "Section boxes: %1, %2 voxels, %3 % of the scan")
+                     .arg(boxes.sections.size())
+                     .arg(count_text(boxes.section_voxels()), percent_text(boxes.section_voxels(), scan)) +
+                 '\n' +
+                 QCoreApplication::translate("ImagingBoxes", "Leaves: %1, of which %2 are full and %3 partly full")
+                     .arg(count_text(leaves), count_text(full), count_text(leaves - full));
+  if (boxes.leaves.size() > kMostDrawnLeaves)
+    text += '\n' + QCoreApplication::translate("ImagingBoxes",
+                                               "Never more than %1 are shown. Choose a section, or fewer subdivisions.")
+                       .arg(count_text(static_cast<std::int64_t>(kMostDrawnLeaves)));
+  return text;
 }
 
 }  // namespace
@@ -68,6 +75,7 @@ ImagingBoxes::ImagingBoxes(const ImagingScene& scene, Events events, QWidget* pa
   subdivisions_->setToolTip(tr("How often each section is divided into quadrants"));
   subdivisions_->setRange(0, subvolumes::kMostSubdivisions);
   subdivisions_->setValue(kFirstSubdivisions);
+  subdivisions_->installEventFilter(this);
   connect(subdivisions_, QOverload<int>::of(&QSpinBox::valueChanged), this, [this] { refresh(); });
   words_ = new QLabel;
   words_->setObjectName("sub_volumes_words");
@@ -95,6 +103,7 @@ ImagingBoxes::ImagingBoxes(const ImagingScene& scene, Events events, QWidget* pa
   all->addWidget(words_);
   all->addWidget(list_, 1);
   all->addWidget(lines);
+  all->addLayout(make_work());
   all->addWidget(buttons);
   resize(kFirstSize);
   pause_.setSingleShot(true);
@@ -103,7 +112,60 @@ ImagingBoxes::ImagingBoxes(const ImagingScene& scene, Events events, QWidget* pa
   enable_write();
 }
 
+QBoxLayout* ImagingBoxes::make_work() {
+  work_ = new QLabel;
+  work_->setObjectName("sub_volumes_work");
+  work_->setWordWrap(true);
+  work_->setTextFormat(Qt::PlainText);  // names of files are no HTML
+  progress_ = new QProgressBar;
+  progress_->setAccessibleName(tr("Progress"));
+  cancel_ = new QPushButton(tr("Cancel"));
+  cancel_->setObjectName("cancel_sub_volumes");
+  cancel_->setAutoDefault(false);
+  connect(cancel_, &QPushButton::clicked, this, [this] { events_.cancel(); });
+  auto* row = new QHBoxLayout;
+  row->addWidget(work_, 1);
+  row->addWidget(progress_);
+  row->addWidget(cancel_);
+  progress_->hide();
+  cancel_->hide();
+  return row;
+}
+
 ImagingBoxes::~ImagingBoxes() { release(); }
+
+void ImagingBoxes::begin_work(const QString& what) {
+  writing_ = true;
+  work_->setText(what);
+  progress_->setRange(0, 0);
+  progress_->show();
+  cancel_->show();
+  cancel_->setFocus();
+}
+
+void ImagingBoxes::show_progress(int percent) {
+  if (!writing_) return;
+  progress_->setRange(0, 100);
+  progress_->setValue(percent);
+}
+
+void ImagingBoxes::end_work(const QString& sentence) {
+  if (!std::exchange(writing_, false)) return;
+  if (cancel_->hasFocus()) list_->setFocus();
+  work_->setText(sentence);
+  progress_->hide();
+  cancel_->hide();
+}
+
+// The line of the spin box would take these keys, which are those of the edits.
+bool ImagingBoxes::eventFilter(QObject* watched, QEvent* event) {
+  if (watched != subdivisions_ || event->type() != QEvent::ShortcutOverride)
+    return QDialog::eventFilter(watched, event);
+  const auto* key = static_cast<QKeyEvent*>(event);
+  if (!key->matches(QKeySequence::Undo) && !key->matches(QKeySequence::Redo)) return false;
+  event->ignore();
+  return true;
+}
 
 void ImagingBoxes::release() {
   pause_.stop();
@@ -124,14 +186,14 @@ void ImagingBoxes::refresh() {
   Wish now{{scene_.look.kept, scene_.look.corrections, scene_.look.box}, subdivisions_->value()};
   if (now == wanted_) return follow_crosshair();
   wanted_ = std::move(now);
-  drop(tr("Being found …"));
+  drop(tr("Finding the boxes …"));
   pause_.start();
 }
 
 void ImagingBoxes::ask() {
   if (!wanted_ || !isVisible()) return;
   if (finder_) {
-    job_->cancelled = true;  // its end asks again
+    if (job_->wish != *wanted_) job_->cancelled = true;  // its end asks again
     return;
   }
   job_ = std::make_unique<Job>();
@@ -145,8 +207,10 @@ void ImagingBoxes::ask() {
     if (number != jobs_ || !finder_) return;  // it was released meanwhile
     finder_.release()->deleteLater();
     const std::unique_ptr<Job> done = std::move(job_);
-    if (wanted_ == done->wish && done->boxes) return take(*done);
-    ask();
+    if (done->cancelled || wanted_ != done->wish) return ask();
+    if (done->boxes) return take(*done);
+    // Not before an edit, because the same would fail again.
+    drop(tr("This machine has no memory for the sub-volumes. Keep less."));
   });
   finder_->start();
 }
@@ -178,7 +242,7 @@ void ImagingBoxes::fill_list() {
                          .arg(dims.x)
                          .arg(dims.y)
                          .arg(dims.z)
-                         .arg(part_text(subvolumes::voxels_of(section), scene_.scan.geometry)));
+                         .arg(percent_text(subvolumes::voxels_of(section), scene_.scan.geometry)));
     }
   filling_ = false;
   follow_crosshair();
@@ -229,6 +293,7 @@ void ImagingBoxes::hideEvent(QHideEvent* event) {
   if (event->spontaneous()) return;
   release();
   drop({});
+  if (!writing_) work_->clear();
 }
 
 }  // namespace osteon

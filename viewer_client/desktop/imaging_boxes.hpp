@@ -14,8 +14,10 @@
 
 #include "viewer_client/desktop/imaging_plane.hpp"
 
+class QBoxLayout;
 class QLabel;
 class QListWidget;
+class QProgressBar;
 class QPushButton;
 class QSpinBox;
 
@@ -30,22 +32,28 @@ class ImagingBoxes : public QDialog {
     std::function<void(std::shared_ptr<const KeptBoxes> boxes)> show;  // in the scene; nothing: none
     std::function<void(const std::array<int, 3>& voxel)> look_at;
     std::function<void(const std::filesystem::path& folder, int subdivisions)> write;  // a folder that is not there
+    std::function<void()> cancel;                                                      // what it writes
   };
   // `scene` outlives it, or release() is called before the scene goes.
   ImagingBoxes(const ImagingScene& scene, Events events, QWidget* parent);
   ~ImagingBoxes() override;
 
   // Call this before the scan or the islands of the scene change, because the other thread reads them. It stops that
-  // thread, which takes the time of a slice or a section.
+  // thread, which takes the time of a slice.
   void release();
   // The scene has changed.
   void refresh();
   // Whether files may be written now. `reason`: why not.
   void allow(bool on, const QString& reason);
+  // While the files are written, the dialog shows it and can cancel it. After any other work, end_work() does nothing.
+  void begin_work(const QString& what);
+  void show_progress(int percent);
+  void end_work(const QString& sentence);
 
  protected:
   void showEvent(QShowEvent* event) override;
   void hideEvent(QHideEvent* event) override;
+  bool eventFilter(QObject* watched, QEvent* event) override;
 
  private:
   struct Job;
@@ -55,6 +63,7 @@ class ImagingBoxes : public QDialog {
     friend bool operator==(const Wish&, const Wish&) = default;
   };
 
+  QBoxLayout* make_work();
   void ask();
   void take(Job& done);
   // None are known.
@@ -71,12 +80,15 @@ class ImagingBoxes : public QDialog {
   std::optional<Wish> wanted_;
   bool filling_ = false;
   bool may_write_ = false;
+  bool writing_ = false;
   QString why_not_;
   QTimer pause_;  // since the last edit
   QSpinBox* subdivisions_;
   QLabel* words_;
   QListWidget* list_;
-  QPushButton* write_;
+  QLabel* work_;
+  QProgressBar* progress_;
+  QPushButton *write_, *cancel_;
   // The other thread writes into the job, and the GUI thread reads it when that has ended.
   std::unique_ptr<Job> job_;
   std::unique_ptr<QThread> finder_;

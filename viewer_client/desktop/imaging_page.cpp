@@ -91,6 +91,7 @@ ImagingSteps::Events ImagingPage::step_events() {
   return {[this](int percent) {
             progress_->setRange(0, 100);
             progress_->setValue(percent);
+            boxes_->show_progress(percent);
           },
           [this](const std::vector<ListedSeries>& series) { show_series(series); },
           [this](ShownScan scan, const HuHistogram& histogram) { show_scan(std::move(scan), histogram); },
@@ -337,6 +338,7 @@ void ImagingPage::show_work(const QString& what) {
 
 void ImagingPage::end_work(const QString& sentence) {
   words_->setText(sentence);
+  boxes_->end_work(sentence);
   progress_->hide();
   cancel_->hide();
   enable_parts();

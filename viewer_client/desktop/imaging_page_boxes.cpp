@@ -16,7 +16,8 @@ QPushButton* ImagingPage::make_boxes_button() {
          refresh_planes();
        },
        [this](const std::array<int, 3>& voxel) { look_at(voxel); },
-       [this](const std::filesystem::path& folder, int subdivisions) { write_boxes(folder, subdivisions); }},
+       [this](const std::filesystem::path& folder, int subdivisions) { write_boxes(folder, subdivisions); },
+       [this] { steps_.cancel(); }},
       this);
   // The keys of the page's window do not reach the dialog.
   for (QPushButton* of : {undo_, redo_})
@@ -37,7 +38,9 @@ QPushButton* ImagingPage::make_boxes_button() {
 
 void ImagingPage::write_boxes(const std::filesystem::path& folder, int subdivisions) {
   if (steps_.busy() || !scene_.boxes) return;
-  show_work(tr("Writing the root sub-volumes"));
+  const QString what = tr("Writing the root sub-volumes");
+  show_work(what);
+  boxes_->begin_work(what);
   steps_.write_boxes(scene_.scan.geometry, scene_.islands, {scene_.look.kept, scene_.look.corrections, scene_.look.box},
                      found_hu(), subdivisions, folder);
   enable_parts();

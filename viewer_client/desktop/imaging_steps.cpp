@@ -119,6 +119,7 @@ void ImagingSteps::cancel() {
 }
 
 void ImagingSteps::fail(const QString& sentence) {
+  QFile::remove(scratch_file(kKeptFile));  // it may be what fills the disk
   // The user knows the source, and not its copy.
   QString shown = sentence;
   for (const char* copy : {kVoxelFile, kFilteredFiles[0], kFilteredFiles[1]})
@@ -126,19 +127,22 @@ void ImagingSteps::fail(const QString& sentence) {
   events_.failed(cancelled_ ? QString() : shown);
 }
 
-void ImagingSteps::start(const QStringList& arguments, std::function<void(const QString& said)> done) {
+void ImagingSteps::start(const QStringList& arguments, std::function<void(const QString& said)> done,
+                         std::function<void()> undo) {
   cancelled_ = false;
-  run_ = std::make_unique<ImporterRun>(arguments, scratch_file("log"),
-                                       ImporterRun::Events{[this](int percent) { events_.progress(percent); },
-                                                           [this, done = std::move(done)](const QString& said) {
-                                                             run_.release()->deleteLater();
-                                                             if (cancelled_) return fail({});
-                                                             done(said);
-                                                           },
-                                                           [this](const QString& sentence) {
-                                                             run_.release()->deleteLater();
-                                                             fail(sentence);
-                                                           }});
+  run_ = std::make_unique<ImporterRun>(
+      arguments, scratch_file("log"),
+      ImporterRun::Events{[this](int percent) { events_.progress(percent); },
+                          [this, done = std::move(done), undo = std::move(undo)](const QString& said) {
+                            run_.release()->deleteLater();
+                            if (cancelled_ && undo) undo();
+                            if (cancelled_) return fail({});
+                            done(said);
+                          },
+                          [this](const QString& sentence) {
+                            run_.release()->deleteLater();
+                            fail(sentence);
+                          }});
   run_->start();
 }
 
@@ -274,10 +278,16 @@ void ImagingSteps::write_boxes(const ScanGeometry& scan, const IslandMap& island
       },
       [this, arguments, folder] {
         if (!kept_) return fail(QString::fromStdString(kept_.error().message));
-        start(arguments, [this, folder](const QString&) {
-          QFile::remove(scratch_file(kKeptFile));
-          events_.boxes_written(folder);
-        });
+        start(
+            arguments,
+            [this, folder](const QString&) {
+              QFile::remove(scratch_file(kKeptFile));
+              events_.boxes_written(folder);
+            },
+            [folder] {  // osteon-import makes a new folder or ends with an error, so this one is its own
+              std::error_code ignored;
+              std::filesystem::remove_all(folder, ignored);
+            });
       });
 }
 

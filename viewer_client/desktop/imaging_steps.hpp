@@ -73,7 +73,9 @@ class ImagingSteps : public QObject {
   void make(const ImagingEdits& edits, bool with_report);
 
  private:
-  void start(const QStringList& arguments, std::function<void(const QString& said)> done);
+  // `undo`: for a run that was cancelled too late, after its work was done.
+  void start(const QStringList& arguments, std::function<void(const QString& said)> done,
+             std::function<void()> undo = {});
   void in_background(std::function<void()> work, std::function<void()> then);
   void fail(const QString& sentence);
   [[nodiscard]] bool make_scratch();

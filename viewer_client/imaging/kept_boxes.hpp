@@ -2,7 +2,9 @@
 // library.
 #pragma once
 #include <array>
+#include <cstddef>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "common/geometry/lattice.hpp"
@@ -22,16 +24,19 @@ struct KeptLeaf {
 struct KeptBoxes {
   CoordBox object;                 // around all that is kept; empty: nothing is
   std::vector<CoordBox> sections;  // from the first slice to the last
-  std::vector<KeptLeaf> leaves;    // what the quadtree of each section keeps
+  std::vector<KeptLeaf> leaves;    // what the quadtree of each section keeps, in the order of the sections
 
   // The voxels of the sections.
   [[nodiscard]] std::int64_t section_voxels() const;
   [[nodiscard]] std::int64_t full_leaves() const;
   // The section with a voxel; -1: none has it.
   [[nodiscard]] int section_at(const std::array<int, 3>& voxel) const;
+  // Empty, if there is no such section.
+  [[nodiscard]] std::span<const KeptLeaf> leaves_of(int section) const;
 };
 
-// `keep_going` is asked before each slice and each section. It holds the voxels of one section. Error: cancelled.
+// `keep_going` is asked before each slice and each quadrant. Holds a byte for each voxel of one section. Errors:
+// cancelled, exhausted (memory).
 [[nodiscard]] Result<KeptBoxes> kept_boxes(const ScanGeometry& scan, const IslandMap& islands, const KeptParts& kept,
                                            int subdivisions, const KeepGoing& keep_going);
 
@@ -44,7 +49,10 @@ struct DrawnBox {
 };
 inline constexpr std::array<std::uint8_t, 3> kObjectColour{240, 228, 66}, kSectionColour{86, 180, 233},
     kChosenColour{230, 159, 0}, kFullColour{0, 158, 115}, kPartlyFullColour{204, 121, 167};
-// In the order in which they are drawn: `chosen`, the section of this number, lies over all.
+// Leaves that are drawn at most. Each has up to 144 lines in three dimensions.
+inline constexpr std::size_t kMostDrawnLeaves = 1000;
+// In the order in which they are drawn: `chosen`, the section of this number, lies over all. If there are more leaves
+// than kMostDrawnLeaves, those of the chosen section are drawn, and none if that has more, too.
 [[nodiscard]] std::vector<DrawnBox> drawn_boxes(const KeptBoxes& boxes, int chosen);
 
 }  // namespace osteon

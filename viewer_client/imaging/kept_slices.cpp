@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <fstream>
+#include <system_error>
 
 namespace osteon {
 
@@ -54,16 +55,22 @@ std::span<const std::uint8_t> KeptSlices::slice(int slice) {
 Result<void> write_kept(const std::filesystem::path& file, const ScanGeometry& scan, const IslandMap& islands,
                         const KeptParts& kept, const KeepGoing& keep_going) {
   KeptSlices slices(scan, islands, kept);
+  const auto removed = [&](tl::unexpected<Error> error) {
+    std::error_code ignored;
+    std::filesystem::remove(file, ignored);
+    return error;
+  };
   std::ofstream out(file, std::ios::binary);
   out << number_file_header(scan);
   std::vector<char> voxels(static_cast<std::size_t>(scan.dims[0]) * static_cast<std::size_t>(scan.dims[1]));
   for (int slice = 0; slice < scan.dims[2] && out; ++slice) {
-    if (!keep_going(static_cast<double>(slice) / scan.dims[2])) return stopped_while("writing " + file.string());
+    if (!keep_going(static_cast<double>(slice) / scan.dims[2]))
+      return removed(stopped_while("writing " + file.string()));
     std::ranges::transform(slices.slice(slice), voxels.begin(), [](std::uint8_t bone) { return bone == 0 ? 0 : 1; });
     out.write(voxels.data(), static_cast<std::streamsize>(voxels.size()));
   }
   out.close();
-  if (!out) return failure(ErrorCode::internal, "cannot write " + file.string() + "; is the disk full?");
+  if (!out) return removed(failure(ErrorCode::internal, "cannot write " + file.string() + "; is the disk full?"));
   return {};
 }
 

@@ -46,7 +46,7 @@ class KeptSlices {
 };
 
 // Writes the kept voxels as an NRRD file, 1 for each and 0 for the others, for "osteon-import report --bone".
-// `keep_going` is asked before each slice. Errors: internal (disk), cancelled.
+// `keep_going` is asked before each slice. Errors: internal (disk), cancelled. After an error there is no file.
 [[nodiscard]] Result<void> write_kept(const std::filesystem::path& file, const ScanGeometry& scan,
                                       const IslandMap& islands, const KeptParts& kept, const KeepGoing& keep_going);
 

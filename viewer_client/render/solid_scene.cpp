@@ -13,6 +13,11 @@
 #include <vtkRenderer.h>
 #include <vtkUnsignedCharArray.h>
 
+#include <algorithm>
+#include <iterator>
+#include <utility>
+#include <vector>
+
 #include "viewer_client/render/layer_above.hpp"
 #include "viewer_client/render/lighting.hpp"
 #include "viewer_client/render/orientation_marker.hpp"
@@ -25,10 +30,10 @@ namespace osteon {
 namespace {
 
 constexpr std::array<double, 3> kCrossColour{0.35, 0.90, 0.55};  // as on the planes
-constexpr double kCrossBehind = 0.3;                             // opacity, where the surface hides it
+constexpr double kBehind = 0.3;                                  // opacity of lines that the surface hides
 constexpr float kCrossWidth_px = 1.5f;
 constexpr float kBoxWidth_px = 1.5f, kWideBox_px = 4.0f;
-constexpr int kDashes = 12;  // along an edge
+constexpr int kMostDashes = 12, kLeastDashes = 2;  // along an edge; not more than it has voxels
 
 // Lines with a colour each.
 struct Lines {
@@ -55,7 +60,9 @@ struct Lines {
           end[of] = of == axis ? high : begin[of];
         }
         const Vec3 from = grid.origin_mm + grid.axes_mm * begin, way = grid.axes_mm * (end - begin);
-        const int pieces = box.dashed ? 2 * kDashes : 1;
+        const auto along = static_cast<std::size_t>(axis);
+        const int voxels = box.last[along] - box.first[along] + 1;
+        const int pieces = box.dashed ? 2 * std::clamp(voxels, kLeastDashes, kMostDashes) : 1;
         for (int piece = 0; piece < pieces; piece += 2)
           add(from + way * piece / pieces, from + way * (piece + 1) / pieces, box.colour);
       }
@@ -78,18 +85,22 @@ struct SolidScene::Impl {
         actor->GetProperty()->LightingOff();
         actor->GetProperty()->SetLineWidth(kCrossWidth_px);
       }
-      line.behind->GetProperty()->SetOpacity(kCrossBehind);
+      line.behind->GetProperty()->SetOpacity(kBehind);
       renderer->AddActor(line.before);
       layer->add(line.behind, 0);
     }
     marks.emplace(*layer);
     for (BoxLines* of : {&boxes, &wide_boxes}) {
       of->mapper->SetInputData(of->lines);
-      of->actor->SetMapper(of->mapper);
-      of->actor->GetProperty()->LightingOff();
-      of->actor->GetProperty()->SetLineWidth(of == &boxes ? kBoxWidth_px : kWideBox_px);
-      of->actor->PickableOff();
-      renderer->AddActor(of->actor);
+      for (vtkActor* actor : {of->before.Get(), of->behind.Get()}) {
+        actor->SetMapper(of->mapper);
+        actor->GetProperty()->LightingOff();
+        actor->GetProperty()->SetLineWidth(of == &boxes ? kBoxWidth_px : kWideBox_px);
+        actor->PickableOff();
+      }
+      of->behind->GetProperty()->SetOpacity(kBehind);
+      renderer->AddActor(of->before);
+      layer->add(of->behind, 0);
     }
     marker.show(true);
   }
@@ -110,7 +121,9 @@ struct SolidScene::Impl {
   struct BoxLines {
     vtkNew<vtkPolyData> lines;
     vtkNew<vtkPolyDataMapper> mapper;
-    vtkNew<vtkActor> actor;
+    vtkNew<vtkActor> before, behind;
+    VoxelGrid grid;
+    std::vector<WireBox> shown;
   };
 
   vtkRenderWindow& window;
@@ -152,9 +165,15 @@ void SolidScene::show_cross(const VoxelGrid& grid, const std::array<int, 3>& vox
 
 void SolidScene::show_boxes(const VoxelGrid& grid, std::span<const WireBox> boxes) {
   for (Impl::BoxLines* to : {&impl_->boxes, &impl_->wide_boxes}) {
+    std::vector<WireBox> now;
+    std::ranges::copy_if(boxes, std::back_inserter(now),
+                         [&](const WireBox& box) { return box.wide == (to == &impl_->wide_boxes); });
+    const bool same_grid = to->grid.origin_mm == grid.origin_mm && to->grid.axes_mm == grid.axes_mm;
+    if (same_grid && to->shown == now) continue;  // another section is chosen, and the thin lines stay
     Lines lines;
-    for (const WireBox& box : boxes)
-      if (box.wide == (to == &impl_->wide_boxes)) lines.add(grid, box);
+    for (const WireBox& box : now) lines.add(grid, box);
+    to->grid = grid;
+    to->shown = std::move(now);
     to->lines->SetPoints(lines.points);
     to->lines->SetLines(lines.cells);
     to->lines->GetCellData()->SetScalars(lines.colours);

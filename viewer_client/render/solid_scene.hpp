@@ -23,6 +23,7 @@ struct WireBox {
   std::array<int, 3> first{}, last{};
   std::array<std::uint8_t, 3> colour{};
   bool wide = false, dashed = false;
+  friend bool operator==(const WireBox&, const WireBox&) = default;
 };
 
 class SolidScene {
@@ -38,7 +39,7 @@ class SolidScene {
   [[nodiscard]] bool has_soft_tissue() const;
   // Three lines through the voxel of the crosshair, to the ends of the grid. They are faint behind the bones.
   void show_cross(const VoxelGrid& grid, const std::array<int, 3>& voxel);
-  // Empty: none.
+  // Faint behind the bones, as the crosshair is. Empty: none.
   void show_boxes(const VoxelGrid& grid, std::span<const WireBox> boxes);
   // UTF-8; empty: nothing.
   void show_notice(const std::string& notice);

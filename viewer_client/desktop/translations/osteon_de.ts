@@ -756,8 +756,24 @@
         <translation>Die Knochenteile sind noch nicht bekannt.</translation>
     </message>
     <message>
-        <source>Being found …</source>
-        <translation>Wird gesucht …</translation>
+        <source>Finding the boxes …</source>
+        <translation>Die Quader werden gesucht …</translation>
+    </message>
+    <message>
+        <source>This machine has no memory for the sub-volumes. Keep less.</source>
+        <translation>Dem Rechner fehlt Speicher für die Teilvolumen. Behalten Sie weniger.</translation>
+    </message>
+    <message>
+        <source>Never more than %1 are shown. Choose a section, or fewer subdivisions.</source>
+        <translation>Nie sind mehr als %1 zu sehen. Wählen Sie Abschnitt oder weniger Unterteilungen.</translation>
+    </message>
+    <message>
+        <source>Progress</source>
+        <translation>Fortschritt</translation>
+    </message>
+    <message>
+        <source>Cancel</source>
+        <translation>Abbrechen</translation>
     </message>
     <message>
         <source>%1: %2 × %3 × %4, %5 % of the scan</source>

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <filesystem>
 
 #include "tests/support/temp_dir.hpp"
 
@@ -92,7 +93,9 @@ TEST_F(KeptBoxesTest, FollowWhatIsKept) {
 }
 
 TEST_F(KeptBoxesTest, AreFoundUntilSomebodyStops) {
-  for (const int stop : {1, 12, 25, 26}) {
+  // There are 24 questions for the slices. The section of the foot has one for each of 6 slices, one for itself and one
+  // for each quadrant. That of the shaft has 14 and one.
+  for (const int stop : {1, 12, 25, 33, 50}) {
     int asked = 0;
     const auto found = kept_boxes(scan_, islands_, kept_, 3, [&](double fraction) {
       EXPECT_GE(fraction, 0.0);
@@ -111,11 +114,34 @@ TEST_F(KeptBoxesTest, AreDrawnWithTheChosenOneOverAll) {
   ASSERT_EQ(drawn.size(), 6u);  // two leaves, the bounding box, two sections, and the chosen one
   EXPECT_TRUE(drawn[0].dashed);
   EXPECT_FALSE(drawn[1].dashed);
+  EXPECT_EQ(drawn[4].colour, kObjectColour) << "hidden by the sections";
   EXPECT_TRUE(drawn.back().wide);
   EXPECT_EQ(drawn.back().first, (std::array{8, 6, 8}));
   EXPECT_EQ(drawn.back().last, (std::array{13, 11, 21}));
   EXPECT_EQ(drawn_boxes(found, -1).size(), 5u);
   EXPECT_TRUE(drawn_boxes(KeptBoxes(), 0).empty());
+}
+
+TEST_F(KeptBoxesTest, AreNotDrawnWithMoreLeavesThanAPersonCanSee) {
+  KeptBoxes many;
+  many.sections = {{{0, 0, 0}, {2000, 0, 3}}, {{0, 0, 4}, {2000, 0, 9}}, {{0, 0, 12}, {2000, 0, 12}}};
+  many.object = {{0, 0, 0}, {2000, 0, 12}};
+  const auto add = [&](std::size_t section, int count) {
+    const auto& [first, last] = many.sections[section];
+    for (int column = 0; column < count; ++column)
+      many.leaves.push_back({{{column, 0, first.z}, {column, 0, last.z}}, true});
+  };
+  constexpr int kMost = static_cast<int>(kMostDrawnLeaves);
+  add(0, 7);
+  add(1, kMost - 7);
+  const std::size_t boxes = 4;  // that of the object, and three sections
+  EXPECT_EQ(drawn_boxes(many, -1).size(), boxes + kMostDrawnLeaves);
+  add(2, kMost + 1);
+  EXPECT_EQ(drawn_boxes(many, -1).size(), boxes);
+  EXPECT_EQ(drawn_boxes(many, 0).size(), 7 + boxes + 1);
+  EXPECT_EQ(drawn_boxes(many, 1).size(), kMostDrawnLeaves - 7 + boxes + 1);
+  EXPECT_EQ(drawn_boxes(many, 1).front().first, (std::array{0, 0, 4}));
+  EXPECT_EQ(drawn_boxes(many, 2).size(), boxes + 1) << "the section itself has too many";
 }
 
 TEST_F(KeptBoxesTest, TheFileHasEachKeptVoxel) {
@@ -131,6 +157,7 @@ TEST_F(KeptBoxesTest, TheFileHasEachKeptVoxel) {
   EXPECT_EQ(write_kept(folder / "none" / "kept.nrrd", scan_, islands_, kept_, kOn).error().code, ErrorCode::internal);
   EXPECT_EQ(write_kept(folder / "kept.nrrd", scan_, islands_, kept_, [](double) { return false; }).error().code,
             ErrorCode::cancelled);
+  EXPECT_FALSE(std::filesystem::exists(folder / "kept.nrrd")) << "a part of it fills the disk";
 }
 
 }  // namespace
