@@ -38,18 +38,18 @@ QString boxes_text(const KeptBoxes& boxes, const ScanGeometry& scan) {
   const Coord dims = boxes.object.dims();
   const std::int64_t object = subvolumes::voxels_of(boxes.object), full = boxes.full_leaves();
   const auto leaves = static_cast<std::int64_t>(boxes.leaves.size());
-  QString text = QCoreApplication::translate("ImagingBoxes", "Bounding box: %1 × %2 × %3, %4 voxels, %5 % of the scan")
-                     .arg(dims.x)
-                     .arg(dims.y)
-                     .arg(dims.z)
-                     .arg(count_text(object), percent_text(object, scan)) +
-                 '\n' +
-                 QCoreApplication::translate("ImagingBoxes", "Section boxes: %1, %2 voxels, %3 % of the scan")
-                     .arg(boxes.sections.size())
-                     .arg(count_text(boxes.section_voxels()), percent_text(boxes.section_voxels(), scan)) +
-                 '\n' +
-                 QCoreApplication::translate("ImagingBoxes", "Leaves: %1, of which %2 are full and %3 partly full")
-                     .arg(count_text(leaves), count_text(full), count_text(leaves - full));
+  auto text = QCoreApplication::translate("ImagingBoxes", "Bounding box: %1 × %2 × %3, %4 voxels, %5 % of the scan")
+                  .arg(dims.x)
+                  .arg(dims.y)
+                  .arg(dims.z)
+                  .arg(count_text(object), percent_text(object, scan)) +
+              '\n' +
+              QCoreApplication::translate("ImagingBoxes", "Section boxes: %1, %2 voxels, %3 % of the scan")
+                  .arg(boxes.sections.size())
+                  .arg(count_text(boxes.section_voxels()), percent_text(boxes.section_voxels(), scan)) +
+              '\n' +
+              QCoreApplication::translate("ImagingBoxes", "Leaves: %1, of which %2 are full and %3 partly full")
+                  .arg(count_text(leaves), count_text(full), count_text(leaves - full));
   if (boxes.leaves.size() > kMostDrawnLeaves)
     text += '\n' + QCoreApplication::translate("ImagingBoxes",
                                                "Never more than %1 are shown. Choose a section, or fewer subdivisions.")
