@@ -110,7 +110,7 @@ class Reader {
       : page_({.busy = [](bool) {},
                .made = [](const std::filesystem::path&, const QString&) {},
                .may_send = [] { return false; },
-               .send = [](const std::filesystem::path&) {},
+               .send = [](const std::filesystem::path&) { return QString(); },
                .leave = [] {}}) {
     page_.resize(1280, 900);
     page_.show();
