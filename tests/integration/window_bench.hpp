@@ -81,8 +81,14 @@ class WindowBench : public testing::Test {
   [[nodiscard]] QWindow* frame() const { return window_->windowHandle(); }
   [[nodiscard]] QPoint in_frame(const QPoint& at) const { return view_->mapTo(window_.get(), at); }
   void hover(const QPoint& at);
-  void press(const QPoint& at) { ++pushes_, QTest::mousePress(frame(), Qt::LeftButton, {}, in_frame(at)); }
-  void release(const QPoint& at) { QTest::mouseRelease(frame(), Qt::LeftButton, {}, in_frame(at)); }
+  void press(const QPoint& at) {
+    ++pushes_, pressed_ = true;
+    QTest::mousePress(frame(), Qt::LeftButton, {}, in_frame(at));
+  }
+  void release(const QPoint& at) {
+    pressed_ = false;
+    QTest::mouseRelease(frame(), Qt::LeftButton, {}, in_frame(at));
+  }
   void double_click(const QPoint& at) { QTest::mouseDClick(frame(), Qt::LeftButton, {}, in_frame(at)); }
 
   // In pixels of the widget. All four events: of a widget, QTest's own sends the third one only.
@@ -92,6 +98,7 @@ class WindowBench : public testing::Test {
   std::unique_ptr<MainWindow> window_;
   BoneView* view_ = nullptr;
   int pushes_ = 0;
+  bool pressed_ = false;  // the left button, of the application and not of a window
 };
 
 }  // namespace osteon::test
