@@ -97,6 +97,7 @@ TEST(GamePadOfAProgram, TakesNoSignalsAndStopsTheMotorsAtItsEnd) {
     ::sigaction(signal, nullptr, &action);
     return action.sa_handler;
   };
+  ::signal(SIGINT, SIG_DFL);  // A shell that starts the tests in the background has it ignored.
   test::VirtualPad plug;
   {
     GamePad pad;
