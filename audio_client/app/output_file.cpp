@@ -1,6 +1,7 @@
 #include "audio_client/app/output_file.hpp"
 
 #include <unistd.h>
+#include <algorithm>
 
 #include <cerrno>
 #include <filesystem>
@@ -16,10 +17,11 @@ Result<void> check_apart(const std::string& file, const std::string& option, con
   if (file.empty()) return {};
   std::error_code ignored;
   const fs::path place = fs::weakly_canonical(file, ignored);
-  for (const OtherFile& other : others)
-    if (!other.file.empty() && place == fs::weakly_canonical(other.file, ignored))
-      return bad_input(file + " would lose " + other.what + "; give " + option + " another file");
-  return {};
+  const auto lost = std::ranges::find_if(others, [&](const OtherFile& other) {
+    return !other.file.empty() && place == fs::weakly_canonical(other.file, ignored);
+  });
+  if (lost == others.end()) return {};
+  return bad_input(file + " would lose " + lost->what + "; give " + option + " another file");
 }
 
 Result<void> check_output(const std::string& file, const std::string& what, const std::string& option,

@@ -172,7 +172,8 @@ double difference_db(const std::vector<NoisePoint>& a, const std::vector<NoisePo
 // By what the load has slowed the tool: the ratio at which the cut's spectrum has most at the free tool's lines.
 double slowed_by(const ToolModel& model, const sound::Spectrum& cut) {
   double best = 0, best_ratio = 1;
-  for (double ratio = 1.02; ratio > kSlowest; ratio -= 0.001) {
+  for (int thousandths = 1020; thousandths > 1000 * kSlowest; --thousandths) {
+    const double ratio = 1e-3 * thousandths;
     double sum = 0;
     for (const Line& line : model.lines)
       if (line.teeth == 0)

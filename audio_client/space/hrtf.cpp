@@ -154,10 +154,10 @@ EarPair interpolated(const std::vector<Measurement>& measured, const Vec3& direc
 // Mean of the power gains from 400 to 6000 Hz, where a drilling sounds (8.5.4). There an ear is louder by many dB than
 // over all frequencies, so a head that kept the power of white noise would reach full scale.
 double drilling_power(const EarFilter& filter, double rate_hz) {
-  constexpr double kFrom_hz = 400, kTo_hz = 6000, kStep_hz = 100;
+  constexpr int kFrom_hz = 400, kTo_hz = 6000, kStep_hz = 100;
   double sum = 0;
   int count = 0;
-  for (double hz = kFrom_hz; hz <= kTo_hz; hz += kStep_hz, ++count) {
+  for (int hz = kFrom_hz; hz <= kTo_hz; hz += kStep_hz, ++count) {
     std::complex<double> response = 0;
     for (std::size_t n = 0; n < filter.size(); ++n)
       response += static_cast<double>(filter[n]) *

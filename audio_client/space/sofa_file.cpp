@@ -48,7 +48,7 @@ std::vector<HeadResponse> responses(const MYSOFA_HRTF& sofa) {
       const std::size_t which = sofa.DataDelay.elements == 2 ? ear : 2 * m + ear;
       const float delay = which < sofa.DataDelay.elements ? sofa.DataDelay.values[which] : 0.0F;
       std::vector<float>& response = ear == 0 ? heard[m].left : heard[m].right;
-      response.assign(static_cast<std::size_t>(delay + 0.5F), 0.0F);
+      response.assign(static_cast<std::size_t>(std::lround(delay)), 0.0F);
       const float* first = sofa.DataIR.values + (2 * m + ear) * sofa.N;
       response.insert(response.end(), first, first + sofa.N);
     }

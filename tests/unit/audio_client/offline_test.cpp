@@ -339,7 +339,7 @@ TEST(StateRecord, TellsOtherFilesApart) {
   EXPECT_THAT(message("none.h5"), HasSubstr("there is no file"));
   std::filesystem::create_directory(temp / "folder");
   EXPECT_THAT(message("folder"), HasSubstr("is a folder"));
-  std::ofstream(temp / "empty.csv");
+  std::ofstream empty(temp / "empty.csv");
   EXPECT_THAT(message("empty.csv"), HasSubstr("has no byte"));
   std::ofstream(temp / "room.journal") << "SQLite format 3" << '\0';
   EXPECT_THAT(message("room.journal"), HasSubstr("keeps cuts but neither forces nor densities"));

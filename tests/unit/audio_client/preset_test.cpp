@@ -295,12 +295,12 @@ TEST(RecordedPreset, OfBlowsHasTheirModesAndTheirImpacts) {
   const std::vector<float> recording = recorded_blows(modes);
   const auto made = recorded_preset(recording, 44100, preset_of("broach"), {.name = "mine", .tools = {}});
   ASSERT_TRUE(made) << made.error().message;
-  for (const auto& [hz, amplitude] : modes) {
+  for (const KnownMode& known : modes) {
     const auto mode =
-        std::ranges::min_element(made->model.blow.modes, {}, [&](const Mode& m) { return std::abs(m.hz - hz); });
-    EXPECT_NEAR(mode->hz, hz, 10.0);
+        std::ranges::min_element(made->model.blow.modes, {}, [&](const Mode& m) { return std::abs(m.hz - known.hz); });
+    EXPECT_NEAR(mode->hz, known.hz, 10.0);
     EXPECT_NEAR(mode->decay_s, kRinging_s, 0.25 * kRinging_s);
-    EXPECT_NEAR(mode->level_db, 20 * std::log10(amplitude), 2.5);
+    EXPECT_NEAR(mode->level_db, 20 * std::log10(known.amplitude), 2.5);
   }
   std::size_t stored = 0;
   for (const std::vector<float>& transient : made->model.transients) {

@@ -208,7 +208,7 @@ TEST_P(BothWays, ASourceThatJumpsMakesNoStep) {
 TEST(Loudspeakers, BothTogetherHaveOnePowerAtAllAngles) {
   const Space space = space_of(Listening::loudspeakers);
   const double ahead = rms(hear(space, tone(1000), still(round_head(0, 300)), 0.3).left);
-  for (double degrees = 0; degrees < 360; degrees += 15) {
+  for (int degrees = 0; degrees < 360; degrees += 15) {
     const Heard heard = hear(space, tone(1000), still(round_head(degrees, 300)), 0.3);
     EXPECT_NEAR(std::hypot(rms(heard.left), rms(heard.right)), std::numbers::sqrt2 * ahead, 1e-4) << degrees;
   }

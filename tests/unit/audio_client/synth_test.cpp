@@ -362,7 +362,7 @@ TEST(SuctionSound, IsHeardAloneAndSoftlyBesideTheDrill) {
   const auto share = [&](double from_hz, double to_hz) {
     return std::pow(10.0, 0.1 * (sound::band_db(sound::power_spectrum(alone, kRate_hz), from_hz, to_hz) - hiss_db));
   };
-  for (double hz = 500.0; hz < 7900.0; hz += 100.0) EXPECT_LT(share(hz, hz + 100.0), 0.1) << hz;
+  for (int hz = 500; hz < 7900; hz += 100) EXPECT_LT(share(hz, hz + 100), 0.1) << hz;
 }
 
 TEST(SuctionSound, SwellsAndFadesWithoutAClickAndFallsSilent) {
