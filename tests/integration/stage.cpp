@@ -42,7 +42,7 @@ nlohmann::json read_json(const std::filesystem::path& file) {
 namespace {
 
 std::vector<std::string> viewer_arguments(const std::string& address, std::vector<std::string> more) {
-  std::vector<std::string> arguments{"--server", address, "--size", "640x480", "--script", "-"};
+  std::vector<std::string> arguments{"--server", address, "--size", "640x480", "--most-frames", "4", "--script", "-"};
   arguments.insert(arguments.end(), more.begin(), more.end());
   return arguments;
 }

@@ -27,7 +27,8 @@ struct Table {
 // A viewer that is controlled by lines of commands.
 class ScriptedViewer {
  public:
-  // Runs `osteon-viewer --server ADDRESS --size 640x480 --script - MORE`.
+  // Runs `osteon-viewer --server ADDRESS --size 640x480 --most-frames 4 --script - MORE`. In software, 30 pictures a
+  // second would take more than a processor. A screenshot draws at once.
   ScriptedViewer(const std::string& address, const Xvfb& screen, std::vector<std::string> more = {"--plain"});
   // Sends a command and waits for the answering line. Empty if none comes.
   [[nodiscard]] std::string ask(const std::string& command,

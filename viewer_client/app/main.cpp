@@ -70,7 +70,7 @@ constexpr const char* kScriptHelp =
 struct Arguments {
   wire::CredentialArguments credentials;
   std::string server, room, name, hand, size = "1280x720", script, screenshot, frame_log, summary;
-  double patience_s = 5.0;
+  double patience_s = 5.0, most_frames_hz = kMostFrames_hz;
   bool space_mouse = false, console = false;
 };
 
@@ -171,6 +171,7 @@ Result<void> run(const Arguments& arguments) {
   options.case_title = (*watch)->room().case_title;
   options.bounds = (*watch)->room().bounds;
   options.frame_log = arguments.frame_log;
+  options.most_frames_hz = arguments.most_frames_hz;
   options.ask = [&watch = **watch](const RoomRequest& request) {
     return std::visit(
         [&](const auto& asked) -> Result<RoomAnswer> {
@@ -243,6 +244,10 @@ int main(int argc, char** argv) {
                  "Without a script: wait for the surface, save the whole bone as PNG, exit. With one: save the last "
                  "picture");
   app.add_flag("--spacemouse", arguments.space_mouse, "A SpaceMouse moves the camera, whenever one is plugged in");
+  app.add_option("--most-frames", arguments.most_frames_hz,
+                 "Pictures a second at most; fewer leave time to other programs of a machine that draws in software")
+      ->capture_default_str()
+      ->check(number_in(0.1, 60.0));
   app.add_option("--frame-log", arguments.frame_log, "CSV: when each event's surface came in and was drawn");
   app.add_option("--summary", arguments.summary, "JSON written at the end: blocks, triangles, hash, times");
   app.add_option("--timeout", arguments.patience_s, "Seconds to wait for the server")

@@ -19,7 +19,6 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr std::chrono::milliseconds kFramePeriod{33};
 // How long a turn waits for the network. Mouse and script are polled once per turn.
 constexpr std::chrono::milliseconds kTurn{10};
 constexpr double kToolKeyDistance_mm = 120.0;
@@ -165,7 +164,8 @@ void Viewer::draw_now() {
   dirty_ = false;
   ++frames_;
   // Where drawing is slow, leave a fifth of the time to the other programs of this machine.
-  next_draw_ = std::max(begin + kFramePeriod, end + (end - begin) / 4);
+  const std::chrono::duration<double> period(1.0 / options_.most_frames_hz);
+  next_draw_ = std::max(begin + std::chrono::ceil<Clock::duration>(period), end + (end - begin) / 4);
   if (!scene_.complete()) return;
   frame_times_.record(end - begin);
   surface_shown_ = true;

@@ -7,9 +7,11 @@
 #include <cmath>
 #include <numbers>
 #include <numeric>
+#include <span>
 
 #include "common/phantoms/phantom_case.hpp"
 #include "tests/support/scenes/random.hpp"
+#include "tests/support/trials.hpp"
 #include "tests/unit/phantoms/islands.hpp"
 #include "tests/unit/phantoms/made_bones.hpp"
 #include "tests/unit/phantoms/measured_femur.hpp"
@@ -575,16 +577,17 @@ void expect_tissues(const MeasuredPelvis& measured, const Case& bone, const Pelv
 
 // Two pelves: their parameters are measured back from cases of 1.2 mm.
 TEST(PelvisCase, ParametersAreMeasuredBack) {
-  const BoneRecipe recipes[] = {{.kind = "pelvis", .changes = {{"sacroiliac_gap_mm", 4.0}, {"symphysis_gap_mm", 5.0}}},
-                                {.kind = "pelvis",
+  // The second one takes 6 s, and changes less.
+  const BoneRecipe recipes[] = {{.kind = "pelvis",
                                  .preset = "female",
                                  .changes = {{"inclination_degrees", 48.0},
                                              {"anteversion_degrees", 11.0},
                                              {"acetabulum_depth", 0.8},
                                              {"tuberosities_mm", 122.0},
                                              {"sacroiliac_gap_mm", 5.0},
-                                             {"symphysis_gap_mm", 6.0}}}};
-  for (const BoneRecipe& recipe : recipes) {
+                                             {"symphysis_gap_mm", 6.0}}},
+                                {.kind = "pelvis", .changes = {{"sacroiliac_gap_mm", 4.0}, {"symphysis_gap_mm", 5.0}}}};
+  for (const BoneRecipe& recipe : std::span(recipes).first(test::trials(2, 1))) {
     const auto p = pelvis_parameters(recipe);
     ASSERT_TRUE(p) << p.error().message;
     const auto made = build_phantom_case(Pelvis(*p), {.pitch_mm = 1.2, .calibration = {0.001067, 0.131}},
