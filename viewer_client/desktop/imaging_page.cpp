@@ -31,6 +31,13 @@ constexpr int kThresholdPause_ms = 600, kThumbnail_px = 96, kListWidth_px = 250;
 constexpr std::array kImagingWindows{kBoneWindow, kSoftTissueWindow, kWideWindow};
 enum ImagingStackPage { kNothingOpen, kSeriesPage, kWorkPage };
 
+// Planes and panels beside each other. A layout with a label of several lines asks a scroll area for the height that it
+// likes best, and the page would scroll although all of it has room. This one asks for the least that it needs.
+class RowOfLeastHeight : public QHBoxLayout {
+ public:
+  [[nodiscard]] bool hasHeightForWidth() const override { return false; }
+};
+
 QString kind_text(const std::string& kind) {
   if (kind == "table") return QCoreApplication::translate("ImagingPage", "table or headrest");
   if (kind == "cast") return QCoreApplication::translate("ImagingPage", "cast");
@@ -144,7 +151,7 @@ QBoxLayout* ImagingPage::make_head() {
 }
 
 QBoxLayout* ImagingPage::make_work() {
-  auto* row = new QHBoxLayout;
+  auto* row = new RowOfLeastHeight;
   row->setContentsMargins(0, 0, 0, 0);
   row->addLayout(make_planes(), 1);
   row->addLayout(make_side());
@@ -248,7 +255,7 @@ QBoxLayout* ImagingPage::make_side() {
   island_list_ = new QListWidget;
   island_list_->setObjectName("islands");
   island_list_->setAccessibleName(tr("Parts of bone"));
-  island_list_->setFixedWidth(kListWidth_px);
+  island_list_->setMinimumWidth(kListWidth_px);
   connect(island_list_, &QListWidget::itemChanged, this, [this](QListWidgetItem* item) { change_island(item); });
   column->addWidget(island_list_, 1);
   find_ = add_button(*column, tr("Find the parts"), "find_parts", tr("Finds the parts that reach the threshold"),
