@@ -1,5 +1,6 @@
 // Sub-volumes on the page of image processing, with the mouse and the keyboard: they are those of a bone of known
 // boxes, and the files are those of osteon-import.
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <QCoreApplication>
@@ -19,6 +20,7 @@
 
 #include "common/geometry/lattice.hpp"
 #include "common/runtime/files.hpp"
+#include "tests/integration/full_disk.hpp"
 #include "tests/integration/imaging_bench.hpp"
 #include "tests/support/process.hpp"
 #include "tests/support/wait.hpp"
@@ -218,6 +220,18 @@ TEST_F(ImagingBoxesTest, TheFilesAreThoseOfTheImporter) {
   QTest::mouseClick(&part<QPushButton>("imaging_cancel"), Qt::LeftButton);
   ASSERT_TRUE(until([&] { return words() == "Cancelled. Nothing was written."; })) << words();
   EXPECT_TRUE(fs::is_empty(to));
+
+  // A full disk is one sentence, and leaves nothing. There is room again at the next try.
+  {
+    const test::FullDisk disk(to.string(), desk_->temp() / "full");
+    disk.fill();
+    write(to);
+    ASSERT_TRUE(until([&] { return words().find("No space left on device") != std::string::npos; })) << words();
+    EXPECT_THAT(words(), testing::AllOf(testing::HasSubstr(to.string()), testing::HasSubstr("make room on the disk"),
+                                        testing::Not(testing::HasSubstr("\n"))));
+    EXPECT_EQ(label("sub_volumes_work").toStdString(), words());
+    EXPECT_TRUE(fs::is_empty(to));
+  }
   write(to);
   ASSERT_TRUE(until([&] { return words() == "The root sub-volumes are in " + (to / "sub-volumes").string() + "."; }))
       << words();

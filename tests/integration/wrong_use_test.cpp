@@ -24,13 +24,11 @@
 #include <QToolButton>
 #include <QWindow>
 #include <algorithm>
-#include <cerrno>
 #include <chrono>
 #include <cstdlib>
 #include <fstream>
 #include <map>
 #include <memory>
-#include <optional>
 #include <set>
 #include <sstream>
 #include <string>
@@ -39,9 +37,9 @@
 
 #include "common/volume/sparse_volume.hpp"
 #include "server/upload_validation/case_archive.hpp"
+#include "tests/integration/full_disk.hpp"
 #include "tests/integration/window_bench.hpp"
 #include "tests/support/content.hpp"
-#include "tests/support/failing/failing_writes.hpp"
 #include "tests/support/process.hpp"
 #include "tests/support/size_limit.hpp"
 #include "viewer_client/desktop/child_process.hpp"
@@ -76,34 +74,6 @@ pid_t dead_pid() {
 }
 
 void put_bytes(const fs::path& file, const std::string& bytes) { std::ofstream(file, std::ios::binary) << bytes; }
-
-// Writes of children that start from now on fail where the path begins so, as on a full disk.
-class FullDisk {
- public:
-  FullDisk(const std::string& begin, const fs::path& control) : failing_(begin, control) {
-    auto variables = failing_.options().environment;
-    variables.emplace_back("OSTEON_FAILING_FOLDER", begin);
-    for (const auto& [name, value] : variables) {
-      const char* before = std::getenv(name.c_str());
-      before_.emplace(name, before != nullptr ? std::optional<std::string>(before) : std::nullopt);
-      ::setenv(name.c_str(), value.c_str(), 1);
-    }
-  }
-  ~FullDisk() {
-    make_room();
-    for (const auto& [name, value] : before_)
-      value ? ::setenv(name.c_str(), value->c_str(), 1) : ::unsetenv(name.c_str());
-  }
-  FullDisk(const FullDisk&) = delete;
-  FullDisk& operator=(const FullDisk&) = delete;
-  // Files can still be made and renamed, but nothing be written.
-  void fill() const { failing_.begin(ENOSPC, "w"); }
-  void make_room() const { failing_.end(); }
-
- private:
-  test::FailingWrites failing_;
-  std::map<std::string, std::optional<std::string>> before_;
-};
 
 // Closes whatever waits for an answer, as Escape does.
 class Impatience : public QObject {
@@ -228,7 +198,7 @@ TEST_F(WrongUse, AFullDiskLeavesTheOldFileAndTheWork) {
   const fs::path folder = desk_->temp() / "disk", file = folder / "My block.osteon", picture = folder / "picture.png";
   fs::create_directory(folder);
   put_bytes(file, "what was there before");
-  const FullDisk disk(folder.string() + "/", desk_->temp() / "control");
+  const test::FullDisk disk(folder.string() + "/", desk_->temp() / "control");
   open();
   disk.fill();
   window_->save_case_file(QString::fromStdString(file.string()));
@@ -253,7 +223,7 @@ TEST_F(WrongUse, AFullDiskLeavesTheOldFileAndTheWork) {
 
 TEST_F(WrongUse, ADiskThatFillsUpEndsTheSessionAndKeepsTheCut) {
   const fs::path folder = desk_->temp() / "session";
-  const FullDisk disk((folder / "session.journal").string(), desk_->temp() / "control");
+  const test::FullDisk disk((folder / "session.journal").string(), desk_->temp() / "control");
   open(folder);
   drill();
   QTest::qWait(300);
