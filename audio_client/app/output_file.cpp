@@ -1,8 +1,8 @@
 #include "audio_client/app/output_file.hpp"
 
 #include <unistd.h>
-#include <algorithm>
 
+#include <algorithm>
 #include <cerrno>
 #include <filesystem>
 #include <system_error>
