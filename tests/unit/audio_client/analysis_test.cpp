@@ -604,7 +604,7 @@ TEST(Analysis, GoesOnInPartsUntilItIsStopped) {
 // The longest recording, with tables and pictures: they take seconds.
 TEST_F(AnalyseProgram, AStopIsOneSentenceAndWritesNothing) {
   const fs::path file = temp_ / "long.wav";
-  ASSERT_TRUE(sound::write_wav(file, sound::white_noise(0.1, 96000 * 60, 1), 96000));
+  ASSERT_TRUE(sound::write_wav(file, sound::white_noise(0.1, 96000 * 299, 1), 96000));
   test::Process audio(test::program("osteon-audio"), {"analyse", file.string(), "--out", (temp_ / "out").string()});
   ASSERT_TRUE(
       test::wait_until([&] { return audio.err().find("analysing: ") != std::string::npos; }, std::chrono::seconds(60)))
