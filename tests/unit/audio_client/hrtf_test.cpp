@@ -206,7 +206,7 @@ TEST(SofaFile, NumbersThatAreNotThoseOfTheDataAreRefused) {
       std::string damaged = whole;
       std::memcpy(damaged.data() + at, &other, sizeof other);
       ASSERT_TRUE(write_file(temp / "damaged.sofa", damaged));
-      const auto read = read_hrtf(temp / "damaged.sofa", 44100);  // its own rate: another takes three times as long
+      const auto read = read_hrtf(temp / "damaged.sofa", 44100);  // its own rate: another takes twice as long
       refused = !read && read.error().message.find("are not those of its data") != std::string::npos &&
                 read.error().message.find("damaged.sofa") != std::string::npos;
     }
