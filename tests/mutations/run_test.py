@@ -164,6 +164,8 @@ class Copies(unittest.TestCase):
             signal.raise_signal(signal.SIGINT)
             return begun[0]
 
+        # A shell that starts the tests in the background has SIGINT ignored.
+        self.addCleanup(signal.signal, signal.SIGINT, signal.signal(signal.SIGINT, signal.default_int_handler))
         begun, popen = [], subprocess.Popen
         with tempfile.TemporaryDirectory() as folder, mock.patch.object(subprocess, "Popen", popen_with_signal):
             with self.assertRaises(KeyboardInterrupt):

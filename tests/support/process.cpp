@@ -128,7 +128,7 @@ Process::Process(const std::filesystem::path& program, const std::vector<std::st
     sigset_t none;
     ::sigemptyset(&none);
     ::sigprocmask(SIG_SETMASK, &none, nullptr);
-    // Programs keep to a signal that their parent ignores. `nohup deploy/test &` ignores three of these.
+    // A program inherits which signals are ignored. `nohup deploy/test &` has the first three ignored.
     for (const int number : {SIGHUP, SIGINT, SIGQUIT, SIGPIPE}) ::signal(number, SIG_DFL);
     if (folder.empty() || ::chdir(folder.c_str()) == 0) ::execvpe(argv[0], argv.data(), envp.data());
     ::_exit(kCannotStart);
