@@ -31,8 +31,9 @@ constexpr int kThresholdPause_ms = 600, kThumbnail_px = 96, kListWidth_px = 250;
 constexpr std::array kImagingWindows{kBoneWindow, kSoftTissueWindow, kWideWindow};
 enum ImagingStackPage { kNothingOpen, kSeriesPage, kWorkPage };
 
-// Planes and panels beside each other. A layout with a label of several lines asks a scroll area for the height that it
-// likes best, and the page would scroll although all of it has room. This one asks for the least that it needs.
+// Planes and panels beside each other. A label with word wrap gives its layout a height that depends on the width. A
+// QScrollArea gives such a layout its preferred height, and scrolls although the least height has room. This layout
+// hides that dependence, so it gets its least height, or more where there is room.
 class RowOfLeastHeight : public QHBoxLayout {
  public:
   [[nodiscard]] bool hasHeightForWidth() const override { return false; }
