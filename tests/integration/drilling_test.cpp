@@ -40,7 +40,8 @@ class DrillingRoom : public testing::Test {
     std::vector<std::pair<std::string, std::optional<int>>> exits;
     std::string late_mesh_hash, mesh_hash;
     bool killed_were_running = false;
-    double killed_s = 0;  // steady clock
+    double killed_s = 0;   // steady clock
+    double watched_s = 0;  // how long the viewer ran
   };
 
   static void SetUpTestSuite() {
@@ -49,6 +50,7 @@ class DrillingRoom : public testing::Test {
     auto screen = Xvfb::start("640x480");
     ASSERT_TRUE(screen) << "Xvfb is needed; deploy/install installs it";
     Stage stage;
+    const auto begun = std::chrono::steady_clock::now();
     ScriptedViewer viewer(stage.address(), *screen, {"--plain", "--summary", stage / "viewer.json"});
     Process audio = stage.start(
         "osteon-audio", {"--server", stage.address(), "--plain", "--output", "none", "--wav", stage / "sound.wav",
@@ -93,6 +95,7 @@ class DrillingRoom : public testing::Test {
 
     r.exits.emplace_back("late viewer", late.process().terminate());
     r.exits.emplace_back("viewer", viewer.process().terminate());
+    r.watched_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
     r.exits.emplace_back("audio", audio.terminate());
     r.exits.emplace_back("server", stage.server().terminate());
     r.server = read_json(stage / "server.json");
@@ -239,6 +242,14 @@ TEST_F(DrillingRoom, AViewerThatComesLateShowsTheSameSurface) {
   EXPECT_TRUE(results_->pictures_differ_from_start);
   EXPECT_EQ(results_->mesh_hash, results_->late_mesh_hash);
   EXPECT_EQ(results_->mesh_hash, results_->server["mesh_hash"]);
+}
+
+// The bone and the tool change all the time, so a viewer without this limit draws 30 pictures a second.
+TEST_F(DrillingRoom, AViewerDrawsAtMostAsManyPicturesAsItMay) {
+  constexpr int kScreenshots = 2;
+  const int frames = results_->viewer.at("frames").get<int>();
+  EXPECT_LE(frames, kViewerFrames_hz * results_->watched_s + 1 + kScreenshots);
+  EXPECT_GT(frames, 10) << "or the limit would prove nothing";
 }
 
 TEST_F(DrillingRoom, EveryProgramEndsCleanlyOnSigterm) {

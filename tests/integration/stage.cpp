@@ -42,7 +42,8 @@ nlohmann::json read_json(const std::filesystem::path& file) {
 namespace {
 
 std::vector<std::string> viewer_arguments(const std::string& address, std::vector<std::string> more) {
-  std::vector<std::string> arguments{"--server", address, "--size", "640x480", "--most-frames", "4", "--script", "-"};
+  std::vector<std::string> arguments{
+      "--server", address, "--size", "640x480", "--most-frames", std::to_string(kViewerFrames_hz), "--script", "-"};
   arguments.insert(arguments.end(), more.begin(), more.end());
   return arguments;
 }

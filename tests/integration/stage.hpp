@@ -24,11 +24,13 @@ struct Table {
 [[nodiscard]] Table read_table(const std::filesystem::path& file);
 [[nodiscard]] nlohmann::json read_json(const std::filesystem::path& file);
 
+// Pictures a second of a ScriptedViewer. In software, 30 would take more than a processor.
+constexpr int kViewerFrames_hz = 4;
+
 // A viewer that is controlled by lines of commands.
 class ScriptedViewer {
  public:
-  // Runs `osteon-viewer --server ADDRESS --size 640x480 --most-frames 4 --script - MORE`. In software, 30 pictures a
-  // second would take more than a processor. A screenshot draws at once.
+  // Runs `osteon-viewer --server ADDRESS --size 640x480 --most-frames HZ --script - MORE`.
   ScriptedViewer(const std::string& address, const Xvfb& screen, std::vector<std::string> more = {"--plain"});
   // Sends a command and waits for the answering line. Empty if none comes.
   [[nodiscard]] std::string ask(const std::string& command,

@@ -29,7 +29,7 @@ struct ViewerOptions {
   std::string case_title;
   Box bounds;                                     // of the bone
   std::filesystem::path frame_log;                // empty: none
-  double most_frames_hz = kMostFrames_hz;         // pictures a second; a screenshot draws at once
+  double most_frames_hz = kMostFrames_hz;         // pictures a second at most; a screenshot is extra
   bool answers = false;                           // print ok or error on standard output after each command
   bool stop_at_error = false;                     // a failed command ends the run
   std::function<void(const CameraView&)> looked;  // called after every turn with the window's view
