@@ -32,7 +32,8 @@ Points points_of(std::span<const LandmarkPair> pairs, Vec3 LandmarkPair::*scan) 
 
 Result<void> check_spread(const Points& points, const std::string& scan) {
   const Points centred = points.colwise() - points.rowwise().mean();
-  const Vec3 spread = centred.jacobiSvd().singularValues() / std::sqrt(static_cast<double>(points.cols()));
+  const Eigen::Matrix3d covariance = centred * centred.transpose() / static_cast<double>(points.cols());
+  const Vec3 spread = Eigen::JacobiSVD<Eigen::Matrix3d>(covariance).singularValues().cwiseSqrt();  // umeyama's type
   const double beside_mm = std::hypot(spread[1], spread[2]);
   if (beside_mm >= std::max(kLeastBeside_mm, kLeastBesideShare * spread[0])) return {};
   std::array<char, 200> text{};
