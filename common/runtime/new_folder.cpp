@@ -4,6 +4,8 @@
 
 #include <string>
 
+#include "common/core/replace_text.hpp"
+
 namespace osteon {
 
 namespace fs = std::filesystem;
@@ -23,10 +25,10 @@ Result<void> write_new_folder(const fs::path& folder, const std::function<Result
   Result<void> written = write(partial);
   if (written) {
     fs::rename(partial, target, error);
-    if (error)
-      written = failure(ErrorCode::internal,
-                        "cannot rename " + partial.string() + " to " + target.string() + ": " + error.message());
+    if (error) written = failure(ErrorCode::internal, "cannot write " + partial.string() + ": " + error.message());
   }
+  // Users know the name that they gave.
+  if (!written) replace_all(written.error().message, partial.string(), target.string());
   if (!written) fs::remove_all(partial, error);
   return written;
 }

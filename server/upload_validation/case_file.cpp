@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "common/core/digest.hpp"
+#include "common/core/replace_text.hpp"
 #include "common/volume/case.hpp"
 #include "common/volume/case_scan.hpp"
 
@@ -142,11 +143,6 @@ std::uint64_t bytes_below(const std::filesystem::path& folder) {
     if (at->is_regular_file(gone)) bytes += at->file_size(gone);
   }
   return bytes;
-}
-
-void replace_all(std::string& text, const std::string& old, const std::string& now) {
-  for (std::size_t at = 0; (at = text.find(old, at)) != std::string::npos; at += now.size())
-    text.replace(at, old.size(), now);
 }
 
 // An error of the checking process about what is in `work`, with the names of the file and the target instead.
