@@ -7,6 +7,7 @@
 #include <QSettings>
 #include <QVBoxLayout>
 #include <algorithm>
+#include <utility>
 
 namespace osteon {
 
@@ -61,6 +62,7 @@ void Tour::begin_once() {
 }
 
 void Tour::begin(TourStep from) {
+  paused_ = false;
   show_step(static_cast<int>(from));
   next_->setFocus();
 }
@@ -73,6 +75,14 @@ void Tour::end() {
   hide();
   // A keyboard without a place to type would be a trap.
   if (focused && parentWidget() != nullptr) parentWidget()->setFocus();
+}
+
+void Tour::pause(bool on) {
+  if (std::exchange(paused_, on) == on || !running()) return;
+  if (!on) return show_step(step_);
+  timer_.stop();
+  ring_->hide();
+  hide();
 }
 
 void Tour::did(TourStep step) {
@@ -94,6 +104,7 @@ void Tour::show_step(int step) {
   setAccessibleName(title_->text());
   setAccessibleDescription(words_->text());
   next_->setAccessibleDescription(words_->text());
+  if (paused_) return;
   place();
   show();
   timer_.start(kPlacePeriod_ms);

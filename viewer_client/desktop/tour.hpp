@@ -25,6 +25,8 @@ class Tour : public QFrame {
   // From the menu, with the keyboard's focus. `from`: the first step that is still to be done.
   void begin(TourStep from);
   void end();
+  // While it is paused, nothing of it is seen. begin() ends the pause.
+  void pause(bool on);
   // The user did what a step asks for.
   void did(TourStep step);
   [[nodiscard]] bool running() const { return step_ >= 0; }
@@ -40,6 +42,7 @@ class Tour : public QFrame {
   QLabel *title_, *words_;
   QPushButton *next_, *skip_;
   QTimer timer_;
+  bool paused_ = false;
   int step_ = -1;  // -1: not running
 };
 
