@@ -191,18 +191,40 @@ TEST_F(ImagingBoxesTest, AreThoseOfAKnownBoneAndFollowIt) {
   EXPECT_TRUE(until([&] { return orange().pixels == 0; })) << orange().pixels;
 }
 
+// An edit would cancel the files, and Escape does, as the button. The dialog stays, which says so.
+TEST_F(ImagingBoxesTest, WhileItWritesNothingElseEndsIt) {
+  const fs::path to = desk_->temp() / "ended";
+  fs::create_directories(to);
+  const fs::path scratch = cases_folder() / (".partial-imaging-" + std::to_string(QCoreApplication::applicationPid()));
+  const auto enabled = [&] {
+    int count = 0;
+    for (const char* name : {"undo_edit", "threshold", "filter", "close_sub_volumes"})
+      count += part<QWidget>(name).isEnabled() ? 1 : 0;
+    return count;
+  };
+  auto& dialog = part<QDialog>("sub_volumes");
+  auto& button = part<QPushButton>("cancel_sub_volumes");
+  for (const bool by_key : {true, false}) {
+    EXPECT_EQ(enabled(), 4);
+    write(to);
+    EXPECT_EQ(label("sub_volumes_work").toStdString(), "Writing the root sub-volumes");
+    EXPECT_EQ(enabled(), 0);
+    by_key ? QTest::keyClick(&dialog, Qt::Key_Escape) : QTest::mouseClick(&button, Qt::LeftButton);
+    EXPECT_TRUE(dialog.isVisible());
+    ASSERT_TRUE(until([&] { return words() == "Cancelled. Nothing was written."; })) << words();
+    EXPECT_EQ(label("sub_volumes_work").toStdString(), words());
+    EXPECT_TRUE(dialog.isVisible());
+    EXPECT_FALSE(button.isVisible());
+    EXPECT_FALSE(fs::exists(scratch / "kept.nrrd"));
+    EXPECT_TRUE(fs::is_empty(to));
+  }
+  QTest::keyClick(&dialog, Qt::Key_Escape);
+  EXPECT_FALSE(dialog.isVisible());
+}
+
 TEST_F(ImagingBoxesTest, TheFilesAreThoseOfTheImporter) {
   const fs::path to = desk_->temp() / "files";
   fs::create_directories(to);
-  write(to);
-  EXPECT_EQ(label("sub_volumes_work").toStdString(), "Writing the root sub-volumes");
-  QTest::mouseClick(&part<QPushButton>("cancel_sub_volumes"), Qt::LeftButton);
-  ASSERT_TRUE(until([&] { return words() == "Cancelled. Nothing was written."; })) << words();
-  EXPECT_EQ(label("sub_volumes_work").toStdString(), words());
-  EXPECT_FALSE(part<QPushButton>("cancel_sub_volumes").isVisible());
-  const fs::path scratch = cases_folder() / (".partial-imaging-" + std::to_string(QCoreApplication::applicationPid()));
-  EXPECT_FALSE(fs::exists(scratch / "kept.nrrd"));
-
   // Cancelled after osteon-import has ended, and before the window knows it.
   write(to);
   std::vector<pid_t> importers;
@@ -227,8 +249,9 @@ TEST_F(ImagingBoxesTest, TheFilesAreThoseOfTheImporter) {
     disk.fill();
     write(to);
     ASSERT_TRUE(until([&] { return words().find("No space left on device") != std::string::npos; })) << words();
-    EXPECT_THAT(words(), testing::AllOf(testing::HasSubstr(to.string()), testing::HasSubstr("make room on the disk"),
-                                        testing::Not(testing::HasSubstr("\n"))));
+    EXPECT_THAT(words(),
+                testing::AllOf(testing::HasSubstr(to.string()), testing::HasSubstr("make room on the disk"),
+                               testing::Not(testing::HasSubstr(".partial")), testing::Not(testing::HasSubstr("\n"))));
     EXPECT_EQ(label("sub_volumes_work").toStdString(), words());
     EXPECT_TRUE(fs::is_empty(to));
   }

@@ -210,6 +210,10 @@ TEST_F(ImagingEditsTest, LandmarksAreInTheCaseWhereTheClicksWere) {
   list.setCurrentRow(0);
   QTest::mouseClick(&part<QPushButton>("landmark_remove"), Qt::LeftButton);
   EXPECT_EQ(list.count(), 2);
+  QTest::mouseClick(&axial, Qt::LeftButton, {}, left);
+  EXPECT_NE(words().find(" is at "), std::string::npos) << words();
+  click("undo_edit");
+  EXPECT_EQ(words(), "The last edit is taken back.");
   click("undo_edit");
   EXPECT_EQ(list.count(), 3);
   click("tool_look");
@@ -235,6 +239,44 @@ TEST_F(ImagingEditsTest, LandmarksAreInTheCaseWhereTheClicksWere) {
     const Vec3 middle(side * test::kApart_mm, 0.0, 0.5 * two_balls().spacing_mm.z());
     EXPECT_TRUE(((at - middle).cwiseAbs().array() <= half.array()).all()) << at.transpose();
   }
+}
+
+// A number field's line would take the keys, and the field the wheel that scrolls the page.
+TEST_F(ImagingEditsTest, TheKeysAndTheWheelOfThePageAreNotThoseOfANumber) {
+  ImagingPlane& axial = plane("plane_axial");
+  double_click(axial, axial.pixel(ball(1)));
+  ASSERT_TRUE(can_undo());
+  auto& threshold = part<QSpinBox>("threshold");
+  const int before = threshold.value();
+  threshold.setFocus();
+  QTest::keySequence(&threshold, QKeySequence::Undo);
+  EXPECT_TRUE(until([&] { return !can_undo(); }));
+  QTest::keySequence(&threshold, QKeySequence::Redo);
+  EXPECT_TRUE(until([&] { return can_undo(); }));
+  // A name takes its own letters back first.
+  auto& name = part<QComboBox>("landmark_name");
+  name.setFocus();
+  name.lineEdit()->clear();
+  QTest::keyClicks(&name, "x");
+  QTest::keySequence(&name, QKeySequence::Undo);
+  EXPECT_EQ(name.currentText(), "");
+  EXPECT_TRUE(can_undo());
+
+  const auto turn = [](QWidget& over) {
+    const QPoint at = over.rect().center();
+    QWheelEvent wheel(QPointF(at), over.mapToGlobal(at), {}, {0, 120}, Qt::NoButton, {}, Qt::NoScrollPhase, false);
+    QApplication::sendEvent(&over, &wheel);
+  };
+  turn(threshold);
+  EXPECT_EQ(threshold.value(), before);
+  auto& window = part<QComboBox>("window_preset");
+  window.setCurrentIndex(1);
+  turn(window);
+  EXPECT_EQ(window.currentIndex(), 1);
+  EXPECT_EQ(window.focusPolicy(), Qt::StrongFocus) << "the wheel gives the focus";
+  threshold.setFocus();
+  turn(threshold);
+  EXPECT_EQ(threshold.value(), before + threshold.singleStep());
 }
 
 // A landmark begins no search that the user has cancelled, and loses no threshold that was just typed.

@@ -63,7 +63,9 @@ TEST_F(ImagingSendingTest, TheServerGetsTheKeptBone) {
   send("nowhere");
   ASSERT_TRUE(until([&] { return at_rest(); })) << words();
   EXPECT_NE(words().find("is not HOST:PORT"), std::string::npos) << words();
-  send(address_);
+  // Enter sends again.
+  part<QLineEdit>("address").setText(QString::fromStdString(address_));
+  QTest::keyClick(QApplication::focusWidget(), Qt::Key_Return);
   ASSERT_TRUE(until([&] { return at_rest(); })) << words();
   EXPECT_EQ(words(), address_ + " has the case now.");
   escape();
@@ -95,6 +97,7 @@ TEST_F(ImagingSendingTest, WhoCancelsLeavesNothing) {
   escape();
   EXPECT_FALSE(asks());
   EXPECT_EQ(test::names_in(cases_folder()), before) << "nobody has sent it";
+  EXPECT_EQ(said(), "The case of the bone is removed again. The edits are still here.");
 
   // The server stands still, so the packed case waits for it.
   make_to_send();
@@ -146,6 +149,7 @@ TEST_F(ImagingSendingTest, ACaseThatSomebodyMayNeedStays) {
   // Somebody opens it, and closes the dialog before its room is open.
   before = test::names_in(cases_folder());
   part<QCheckBox>("with_report").click();
+  islands().item(0)->setCheckState(Qt::Checked);
   make_to_send();
   const std::filesystem::path second = new_case(before);
   ASSERT_FALSE(second.empty());
@@ -155,6 +159,31 @@ TEST_F(ImagingSendingTest, ACaseThatSomebodyMayNeedStays) {
   escape();
   EXPECT_FALSE(asks());
   EXPECT_TRUE(is_case(second));
+}
+
+TEST_F(ImagingSendingTest, OneCaseIsSentAndOpened) {
+  const std::set<std::string> before = test::names_in(cases_folder());
+  make_to_send();
+  const std::filesystem::path made = new_case(before);
+  const auto cases = test::names_in(cases_folder());
+  make_to_send();
+  QTest::mouseClick(&part<QPushButton>("make_bone"), Qt::LeftButton);
+  ASSERT_TRUE(until([&] { return view_->surface_shown(); })) << said();
+  EXPECT_EQ(test::names_in(cases_folder()), cases);
+  escape();
+  EXPECT_TRUE(is_case(made)) << "it is open";
+  EXPECT_EQ(recent_entries().front().bone, made);
+  // Other cases have the title of the scan, too.
+  const QString title = recent_entries().front().title.section('\n', 0, 0);
+  EXPECT_EQ(title.toStdString(), "CT (" + made.filename().string() + ")");
+
+  // The page and its edits are there beside the open bone. Another edit is another case.
+  trigger("import_scan");
+  ASSERT_TRUE(islands().isVisible());
+  EXPECT_EQ(islands().item(1)->checkState(), Qt::Checked);
+  islands().item(0)->setCheckState(Qt::Checked);
+  make_to_send();
+  EXPECT_NE(test::names_in(cases_folder()), cases);
 }
 
 }  // namespace

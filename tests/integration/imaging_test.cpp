@@ -361,6 +361,18 @@ TEST_F(ImagingTest, EachStepCanBeCancelled) {
   click("undo_edit");
   ASSERT_TRUE(until([&] { return found(2) && islands().isEnabled(); })) << words();
   islands().item(1)->setCheckState(Qt::Checked);
+  // A filter that is cancelled changes no voxel, and can be taken back.
+  ImagingPlane& axial = plane("plane_axial");
+  const QImage sharp = axial.grab().toImage();
+  part<QComboBox>("filter").setCurrentIndex(3);
+  Q_EMIT part<QComboBox>("filter").activated(3);
+  cancel();
+  EXPECT_FALSE(fs::exists(scratch() / "filtered-1.nrrd"));
+  EXPECT_FALSE(part<QPushButton>("make_bone").isEnabled()) << "the parts are of another filter";
+  click("undo_edit");
+  EXPECT_EQ(part<QComboBox>("filter").currentIndex(), 0);
+  EXPECT_EQ(axial.grab().toImage(), sharp);
+  EXPECT_EQ(ticks(), (std::vector<bool>{false, true}));
   const auto before = test::names_in(cases_folder());
   click("make_bone");
   EXPECT_FALSE(part<QPushButton>("imaging_back").isEnabled());

@@ -4,7 +4,6 @@
 #include <QFileDialog>
 #include <QFormLayout>
 #include <QHideEvent>
-#include <QKeyEvent>
 #include <QLabel>
 #include <QListWidget>
 #include <QLocale>
@@ -19,6 +18,7 @@
 #include "common/subvolumes/quadtree.hpp"
 #include "viewer_client/desktop/enabled.hpp"
 #include "viewer_client/desktop/library.hpp"
+#include "viewer_client/desktop/page_fields.hpp"
 
 namespace osteon {
 
@@ -75,7 +75,6 @@ ImagingBoxes::ImagingBoxes(const ImagingScene& scene, Events events, QWidget* pa
   subdivisions_->setToolTip(tr("How often each section is divided into quadrants"));
   subdivisions_->setRange(0, subvolumes::kMostSubdivisions);
   subdivisions_->setValue(kFirstSubdivisions);
-  subdivisions_->installEventFilter(this);
   connect(subdivisions_, QOverload<int>::of(&QSpinBox::valueChanged), this, [this] { refresh(); });
   words_ = new QLabel;
   words_->setObjectName("sub_volumes_words");
@@ -91,8 +90,10 @@ ImagingBoxes::ImagingBoxes(const ImagingScene& scene, Events events, QWidget* pa
   auto* form = new QFormLayout;
   form->addRow(tr("Subdivisions"), subdivisions_);
   auto* buttons = new QDialogButtonBox;
-  buttons->addButton(tr("Close"), QDialogButtonBox::RejectRole)->setAutoDefault(false);
-  connect(buttons, &QDialogButtonBox::rejected, this, [this] { hide(); });
+  close_ = buttons->addButton(tr("Close"), QDialogButtonBox::RejectRole);
+  close_->setObjectName("close_sub_volumes");
+  close_->setAutoDefault(false);
+  connect(buttons, &QDialogButtonBox::rejected, this, [this] { reject(); });
   write_ = buttons->addButton(tr("&Write root sub-volumes…"), QDialogButtonBox::ActionRole);
   write_->setObjectName("write_sub_volumes");
   write_->setToolTip(tr("Makes a folder with Meta.dat, SBB1.dat and so on, the report, and a picture of the boxes"));
@@ -106,6 +107,7 @@ ImagingBoxes::ImagingBoxes(const ImagingScene& scene, Events events, QWidget* pa
   all->addLayout(make_work());
   all->addWidget(buttons);
   resize(kFirstSize);
+  leave_keys_and_wheel(*this);
   pause_.setSingleShot(true);
   pause_.setInterval(kBoxesPause_ms);
   connect(&pause_, &QTimer::timeout, this, [this] { ask(); });
@@ -141,6 +143,7 @@ void ImagingBoxes::begin_work(const QString& what) {
   progress_->show();
   cancel_->show();
   cancel_->setFocus();
+  set_enabled(*close_, false, tr("The files are being written. Wait for them, or cancel."));
 }
 
 void ImagingBoxes::show_progress(int percent) {
@@ -155,17 +158,11 @@ void ImagingBoxes::end_work(const QString& sentence) {
   work_->setText(sentence);
   progress_->hide();
   cancel_->hide();
+  set_enabled(*close_, true, {});
 }
 
-// The line of the spin box would take these keys, which are those of the edits.
-bool ImagingBoxes::eventFilter(QObject* watched, QEvent* event) {
-  if (watched != subdivisions_ || event->type() != QEvent::ShortcutOverride)
-    return QDialog::eventFilter(watched, event);
-  const auto* key = static_cast<QKeyEvent*>(event);
-  if (!key->matches(QKeySequence::Undo) && !key->matches(QKeySequence::Redo)) return false;
-  event->ignore();
-  return true;
-}
+// Escape, or the window's own button. What is being written would go on unseen.
+void ImagingBoxes::reject() { writing_ ? events_.cancel() : hide(); }
 
 void ImagingBoxes::release() {
   pause_.stop();

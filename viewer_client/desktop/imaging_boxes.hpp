@@ -49,11 +49,12 @@ class ImagingBoxes : public QDialog {
   void begin_work(const QString& what);
   void show_progress(int percent);
   void end_work(const QString& sentence);
+  [[nodiscard]] bool writing() const { return writing_; }
+  void reject() override;
 
  protected:
   void showEvent(QShowEvent* event) override;
   void hideEvent(QHideEvent* event) override;
-  bool eventFilter(QObject* watched, QEvent* event) override;
 
  private:
   struct Job;
@@ -88,7 +89,7 @@ class ImagingBoxes : public QDialog {
   QListWidget* list_;
   QLabel* work_;
   QProgressBar* progress_;
-  QPushButton *write_, *cancel_;
+  QPushButton *write_, *cancel_, *close_;
   // The other thread writes into the job, and the GUI thread reads it when that has ended.
   std::unique_ptr<Job> job_;
   std::unique_ptr<QThread> finder_;

@@ -21,13 +21,14 @@
 
 #include "viewer_client/desktop/enabled.hpp"
 #include "viewer_client/desktop/library.hpp"
+#include "viewer_client/desktop/page_fields.hpp"
 
 namespace osteon {
 
 namespace {
 
 constexpr double kLeastGaussian_mm = 0.05, kMostGaussian_mm = 10.0, kGaussianStep_mm = 0.1, kFirstGaussian_mm = 0.5;
-constexpr int kThresholdPause_ms = 600, kThumbnail_px = 96, kListWidth_px = 250;
+constexpr int kThresholdPause_ms = 600, kThumbnail_px = 96, kListWidth_px = 250, kListSpacing_px = 4;
 constexpr std::array kImagingWindows{kBoneWindow, kSoftTissueWindow, kWideWindow};
 enum ImagingStackPage { kNothingOpen, kSeriesPage, kWorkPage };
 
@@ -75,6 +76,7 @@ ImagingPage::ImagingPage(Events events, QWidget* parent)
   series_list_->setAccessibleName(tr("Series of the CT"));
   series_list_->setIconSize({kThumbnail_px, kThumbnail_px});
   series_list_->setWordWrap(true);
+  series_list_->setSpacing(kListSpacing_px);  // some have no picture, and their lines would look like one text
   connect(series_list_, &QListWidget::itemClicked, this, [this](QListWidgetItem* item) { read_row(item); });
   connect(series_list_, &QListWidget::itemActivated, this, [this](QListWidgetItem* item) { read_row(item); });
   stack_->addWidget(series_list_);
@@ -92,6 +94,7 @@ ImagingPage::ImagingPage(Events events, QWidget* parent)
   threshold_timer_.setSingleShot(true);
   threshold_timer_.setInterval(kThresholdPause_ms);
   connect(&threshold_timer_, &QTimer::timeout, this, [this] { apply_threshold(); });
+  leave_keys_and_wheel(*this);
   end_work({});
 }
 
@@ -267,11 +270,13 @@ QBoxLayout* ImagingPage::make_side() {
   undo_ = add_button(*column, tr("&Undo the edit"), "undo_edit", tr("Takes the last edit back"), [this] {
     take_threshold();
     history_.undo();
+    if (!steps_.busy()) words_->setText(tr("The last edit is taken back."));  // no longer what it did
     follow_edits();
   });
   undo_->setShortcut(QKeySequence::Undo);
   redo_ = add_button(*column, tr("&Redo the edit"), "redo_edit", tr("Does it again"), [this] {
     history_.redo();
+    if (!steps_.busy()) words_->setText(tr("The edit is done again."));
     follow_edits();
   });
   redo_->setShortcut(QKeySequence::Redo);
@@ -280,7 +285,7 @@ QBoxLayout* ImagingPage::make_side() {
   report_ = make_report_choice();
   column->addWidget(report_);
   make_ = add_button(*column, tr("&Make the bone"), "make_bone",
-                     tr("Makes a case of the kept bones, and opens it to practise"), [this] { make_bone(); });
+                     tr("Makes a case of the kept bones, and opens it to practise"), [this] { make_bone(false); });
   send_ =
       add_button(*column, tr("Send to a server…"), "send_bone",
                  tr("Makes a case of the kept bones, and opens the dialog that sends it"), [this] { make_and_send(); });
@@ -311,6 +316,7 @@ void ImagingPage::open_source(const QString& source) {
   scene_.scan = {};
   scene_.first = {};
   scene_.islands = {};
+  made_.reset();
   islands_.clear();
   series_.clear();
   series_list_->clear();
@@ -398,6 +404,7 @@ void ImagingPage::show_scan(ShownScan scan, const HuHistogram& histogram) {
   release_scene();
   scene_.scan = std::move(scan);
   scene_.first = {};
+  made_.reset();
   histogram_->set_histogram(histogram);
   begin_planes();
   enable_parts();
@@ -531,7 +538,8 @@ void ImagingPage::refresh_planes() {
 }
 
 void ImagingPage::enable_parts() {
-  const bool free = !steps_.busy(), making = steps_.making(), waits = scene_.waits();
+  // An edit would cancel the files that are being written.
+  const bool free = !steps_.busy(), making = steps_.making() || boxes_->writing(), waits = scene_.waits();
   // Until the user has stopped to change the threshold, the parts are of another one than the page shows.
   const bool changing = threshold_timer_.isActive();
   const bool found = free && !changing && scene_.open() && !islands_.empty() && current();

@@ -55,11 +55,15 @@ class ImagingPage : public QWidget {
 
   // A folder, zip, ISO image or file. What is open goes.
   void open_source(const QString& source);
+  [[nodiscard]] bool has_scan() const { return scene_.open(); }
   [[nodiscard]] bool making() const { return steps_.making(); }
   void cancel() { steps_.cancel(); }
+  // Somebody may have removed the case that it made, which it says then.
+  void check_made();
 
  protected:
   void hideEvent(QHideEvent* event) override;
+  void showEvent(QShowEvent* event) override;
 
  private:
   // Before the scan or the islands of the scene change.
@@ -95,7 +99,8 @@ class ImagingPage : public QWidget {
   void show_islands(std::vector<ListedIsland> list, IslandMap map);
   void find_islands();
   void show_largest_bone();
-  void make_bone();
+  // Or takes the case again that it has just made of the same edits.
+  void make_bone(bool sends);
   void make_and_send();
   void use_made(const std::filesystem::path& bone);
 
@@ -179,7 +184,12 @@ class ImagingPage : public QWidget {
   QString wanted_source_;       // to open when the step at work has ended
   bool wants_islands_ = false;  // the same
   bool sends_made_ = false;     // the case that is being made
-  bool filling_ = false;        // the list changes by itself
+  struct MadeCase {
+    ImagingEdits edits;
+    std::filesystem::path bone;  // empty: it is being made
+  };
+  std::optional<MadeCase> made_;  // the last one of this scan
+  bool filling_ = false;          // the list changes by itself
   std::vector<ListedSeries> series_;
   QStackedWidget* stack_;
   QWidget* work_area_;

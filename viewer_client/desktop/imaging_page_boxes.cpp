@@ -51,4 +51,9 @@ void ImagingPage::hideEvent(QHideEvent* event) {
   if (!event->spontaneous()) boxes_->hide();
 }
 
+void ImagingPage::showEvent(QShowEvent* event) {
+  QWidget::showEvent(event);
+  check_made();
+}
+
 }  // namespace osteon

@@ -14,6 +14,7 @@
 
 #include "viewer_client/desktop/imaging_page.hpp"
 #include "viewer_client/desktop/landmark_names.hpp"
+#include "viewer_client/desktop/library.hpp"
 
 namespace osteon {
 
@@ -318,7 +319,7 @@ void ImagingPage::refresh_look() {
   set_tints(look, edits.labels);
 }
 
-void ImagingPage::make_bone() {
+void ImagingPage::make_bone(bool sends) {
   end_drags(true);
   if (!make_->isEnabled()) return;  // a box has begun a search
   const ImagingEdits& edits = history_.now();
@@ -331,25 +332,36 @@ void ImagingPage::make_bone() {
       else if (same->bone != seed.bone)
         return words_->setText(tr("Seeds of two bones are in one voxel now. Choose a lower threshold, or undo one."));
     }
+  sends_made_ = sends;
+  const ImagingEdits made = made_edits(edits, std::move(seeds), scene_.scan.geometry);
+  const bool same = made_ && made_->edits == made && is_case(made_->bone);
+  if (same && (!report_->isChecked() || is_file(report_page(made_->bone)))) return use_made(made_->bone);
+  made_ = {made, {}};
   show_work(tr("The bone is being made"));
-  sends_made_ = false;
-  steps_.make(made_edits(edits, std::move(seeds), scene_.scan.geometry), report_->isChecked());
+  steps_.make(made, report_->isChecked());
+  if (!steps_.making()) sends_made_ = false;
   events_.busy(steps_.making());
   enable_parts();
 }
 
 void ImagingPage::make_and_send() {
   if (!send_->isEnabled() || !events_.may_send()) return;
-  make_bone();
-  sends_made_ = steps_.making();
+  make_bone(true);
 }
 
 void ImagingPage::use_made(const std::filesystem::path& bone) {
   events_.busy(false);
+  made_->bone = bone;
   const QString said = show_report(bone);
   end_work(said);
   if (std::exchange(sends_made_, false)) return words_->setText(said + ' ' + events_.send(bone));
   events_.made(bone, said);
+}
+
+void ImagingPage::check_made() {
+  if (steps_.busy() || !made_ || made_->bone.empty() || is_case(made_->bone)) return;
+  made_.reset();
+  words_->setText(tr("The case of the bone is removed again. The edits are still here."));
 }
 
 }  // namespace osteon

@@ -18,7 +18,7 @@ QCheckBox* ImagingPage::make_report_choice() {
 }
 
 QString ImagingPage::show_report(const std::filesystem::path& bone) const {
-  const std::filesystem::path page = report_folder(bone) / "report.html";
+  const std::filesystem::path page = report_page(bone);
   if (!is_file(page)) return tr("The bone is made.");
   if (!QDesktopServices::openUrl(QUrl::fromLocalFile(text_of(page))))
     return tr("The bone is made. No program opens its report %1.").arg(text_of(page));

@@ -67,7 +67,11 @@ ImagingSolid::ImagingSolid(const ImagingScene& scene, Events events, QWidget* pa
   hint_->setAlignment(Qt::AlignCenter);
   view_ = new SolidView(
       {[this](const SolidHit& hit) { events_.choose_bone(hit.bone, voxel_near(scene_.scan.geometry, hit.point_mm)); },
-       [this](const SolidHit& hit) { events_.look_at(voxel_near(scene_.scan.geometry, hit.point_mm)); },
+       [this](const SolidHit& hit) {
+         // A block's surface lies beside the voxels that are bone.
+         const std::array<int, 3> at = voxel_near(scene_.scan.geometry, hit.point_mm);
+         events_.look_at(bone_voxel_near(scene_.scan.geometry, scene_.islands, kept(), hit.bone, at).value_or(at));
+       },
        [this] { update(); }});
   stack_ = new QStackedWidget;
   stack_->addWidget(hint_);

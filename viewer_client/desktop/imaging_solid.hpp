@@ -29,7 +29,7 @@ class ImagingSolid : public QWidget {
 
  public:
   struct Events {
-    std::function<void(const std::array<int, 3>& voxel)> look_at;                // the user has chosen a voxel
+    std::function<void(const std::array<int, 3>& voxel)> look_at;  // the user has chosen a voxel of a bone
     std::function<void(int bone, const std::array<int, 3>& voxel)> choose_bone;  // or a bone, at a voxel
   };
   // `scene` outlives it.

@@ -50,10 +50,11 @@ ListedSeries listed_series(const QJsonObject& of, int taken, const QString& pict
   series.hu = pictures + QString("/series-%1.nrrd").arg(series.number);
   series.slices = of["slices"].toInt();
   const QJsonArray spacing = of["spacing_mm"].toArray();
-  QString what = QCoreApplication::translate("ImagingSteps", "CT, %1 slices, %2 × %3 pixels")
-                     .arg(of["slices"].toInt())
+  QString what = (series.slices == 1 ? QCoreApplication::translate("ImagingSteps", "CT, 1 slice, %1 × %2 pixels")
+                                     : QCoreApplication::translate("ImagingSteps", "CT, %3 slices, %1 × %2 pixels"))
                      .arg(of["columns"].toInt())
                      .arg(of["rows"].toInt());
+  if (series.slices != 1) what = what.arg(series.slices);
   if (spacing.size() == 3 && spacing[2].toDouble() > 0.0)
     what += QCoreApplication::translate("ImagingSteps", ", pitch %1 × %2 × %3 mm")
                 .arg(number_text(spacing[0].toDouble()), number_text(spacing[1].toDouble()),

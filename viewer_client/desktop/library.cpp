@@ -92,6 +92,8 @@ std::filesystem::path new_case_folder(const QString& source) {
 
 std::filesystem::path report_folder(const std::filesystem::path& bone) { return bone.string() + ".report"; }
 
+std::filesystem::path report_page(const std::filesystem::path& bone) { return report_folder(bone) / "report.html"; }
+
 std::filesystem::path edit_list_of(const std::filesystem::path& bone) { return bone.string() + ".edits.yaml"; }
 
 void remove_unused_case(const std::filesystem::path& bone) {
@@ -139,8 +141,11 @@ bool is_case(const std::filesystem::path& folder) {
 QString case_title(const std::filesystem::path& bone) {
   for (const ExampleBone& example : example_bones())
     if (bone == example_folder(example)) return example.title;
-  const QString title = text_in_case(bone, "title");
-  return title.isEmpty() ? text_of(bone.filename()) : title;
+  const QString title = text_in_case(bone, "title"), folder = text_of(bone.filename());
+  if (title.isEmpty()) return folder;
+  // Most scans have the title "CT", but each a folder of its own.
+  const bool made_here = bone.parent_path() == cases_folder() && !is_name_of_unpacked(bone.filename().string());
+  return made_here && title != folder ? QString("%1 (%2)").arg(title, folder) : title;
 }
 
 namespace {

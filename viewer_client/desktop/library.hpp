@@ -47,6 +47,7 @@ void remember(const RecentEntry& entry);
 [[nodiscard]] std::filesystem::path new_case_folder(const QString& source);
 // Of the report of a case that was made with one: beside the case.
 [[nodiscard]] std::filesystem::path report_folder(const std::filesystem::path& bone);
+[[nodiscard]] std::filesystem::path report_page(const std::filesystem::path& bone);  // to open in a browser
 // Of the edit list of a case that image processing made: beside the case, too.
 [[nodiscard]] std::filesystem::path edit_list_of(const std::filesystem::path& bone);
 // Removes a case with its edit list and its report, unless the start page knows a session of it.

@@ -107,6 +107,7 @@ void MainWindow::import_scan(const QString& source) {
 
 void MainWindow::choose_scan() {
   if (is_busy()) return;
+  if (practice_ && imaging_->has_scan()) leave_room();  // it is kept, and the start page goes on with it
   if (!practice_ && !room_) return pages_->setCurrentWidget(imaging_);
   // Nobody leaves a room before a scan is chosen.
   const QString folder = QFileDialog::getExistingDirectory(this, tr("The folder of a CT"));
@@ -136,6 +137,7 @@ void MainWindow::make_imaging_page() {
 // Image processing needs the place of the panels and tools, which belong to a room.
 void MainWindow::lay_out_page() {
   const bool processes = pages_->currentWidget() == imaging_;
+  tour_->pause(processes);
   if (processes == !room_layout_.isEmpty()) return;
   if (!processes) {
     restoreState(std::exchange(room_layout_, {}));
@@ -194,7 +196,11 @@ QString MainWindow::send_made_case(const std::filesystem::path& bone) {
     say(next);
     return next;
   }
-  open_send_dialog(bone, case_title(bone), false);
+  if (!sender_ || !sender_->isVisible() || !sender_->holds(bone)) {
+    open_send_dialog(bone, case_title(bone), false);
+    connect(sender_.get(), &QDialog::finished, this, [this] { imaging_->check_made(); });
+  }
+  raise_sender();
   return tr("Send the bone in the dialog.");
 }
 

@@ -42,13 +42,13 @@ SendDialog::SendDialog(std::filesystem::path what, const QString& title, Stays s
   send_ = buttons->addButton(tr("&Send"), QDialogButtonBox::ActionRole);
   send_->setObjectName("send_case");
   send_->setToolTip(tr("Sends the case. The one on this computer stays as it is."));
-  send_->setDefault(true);
   close_ = buttons->addButton(QDialogButtonBox::Close);
   close_->setObjectName("send_close");
   close_->setAutoDefault(false);  // a second Enter cancels nothing
   connect(send_, &QPushButton::clicked, this, [this] { send(); });
   connect(close_, &QPushButton::clicked, this, [this] { reject(); });
   all->addWidget(buttons);
+  send_->setDefault(true);  // of the dialog, so not before it is in there
   QString first = tr("The server checks the case and keeps it. Whoever may open rooms there can send it.");
   if (drops_) first += ' ' + stays_if_sent();
   end(first);
@@ -111,6 +111,7 @@ void SendDialog::send() {
                             end(!sentence.isEmpty() ? sentence
                                 : drops_ ? tr("Cancelled. The server stored nothing. Send the case again, or close.")
                                          : tr("Cancelled. The server stored nothing, and the case here stays."));
+                            send_->setFocus();  // Enter sends it again
                             ended_(false);
                           }});
   progress_->show();

@@ -174,6 +174,30 @@ int island_near(const ScanGeometry& scan, const IslandMap& islands, const BonesO
   return 0;
 }
 
+std::optional<std::array<int, 3>> bone_voxel_near(const ScanGeometry& scan, const IslandMap& islands,
+                                                  const KeptParts& kept, int bone, const std::array<int, 3>& voxel) {
+  const std::array<int, 3> step = blocks_of(scan).step;
+  KeptSlices slices(scan, islands, kept);
+  const VoxelRange& range = slices.range();
+  std::array<int, 3> first{}, last{};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    first[axis] = std::max(range.first[axis], voxel[axis] - step[axis] - 1);
+    last[axis] = std::min(range.last[axis], voxel[axis] + step[axis] + 1);
+  }
+  std::optional<std::array<int, 3>> nearest;
+  double least_mm = std::numeric_limits<double>::infinity();
+  for (int z = first[2]; z <= last[2]; ++z) {
+    const std::span<const std::uint8_t> slice = slices.slice(z);
+    for (int y = first[1]; y <= last[1]; ++y)
+      for (int x = first[0]; x <= last[0]; ++x) {
+        if (slice[to_index(y) * to_index(scan.dims[0]) + to_index(x)] != bone) continue;
+        const double distance_mm = (scan.axes_mm * Vec3(x - voxel[0], y - voxel[1], z - voxel[2])).norm();
+        if (distance_mm < least_mm) least_mm = distance_mm, nearest = {x, y, z};
+      }
+  }
+  return nearest;
+}
+
 std::vector<Vec3> painted_points(std::span<const SharedCorrection> corrections, double least_mm) {
   std::vector<Vec3> points;
   for (const SharedCorrection& stroke : corrections) {

@@ -1,6 +1,7 @@
 // The surfaces of the bones that are kept of a scan, as far as they are known before osteon-import makes the bone.
 #pragma once
 #include <array>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -28,6 +29,12 @@ struct KeptSurface {
 // that bone. 0: it has none, so it is painted.
 [[nodiscard]] int island_near(const ScanGeometry& scan, const IslandMap& islands, const BonesOfIslands& bones, int bone,
                               const std::array<int, 3>& voxel);
+
+// The voxel that kept_surfaces() has of this bone and that is nearest to another voxel, within a block and a voxel.
+// None: the edits have changed since then. Errors: none. It makes as many slices as it looks at.
+[[nodiscard]] std::optional<std::array<int, 3>> bone_voxel_near(const ScanGeometry& scan, const IslandMap& islands,
+                                                                const KeptParts& kept, int bone,
+                                                                const std::array<int, 3>& voxel);
 
 // Points of the strokes that paint, for marks: the first one of each, and then one for each `least_mm` at most.
 [[nodiscard]] std::vector<Vec3> painted_points(std::span<const SharedCorrection> corrections, double least_mm);

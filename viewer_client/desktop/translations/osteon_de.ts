@@ -787,6 +787,10 @@
         <source>There are no sub-volumes yet.</source>
         <translation>Es gibt noch keine Teilvolumen.</translation>
     </message>
+    <message>
+        <source>The files are being written. Wait for them, or cancel.</source>
+        <translation>Die Dateien werden geschrieben. Warten Sie darauf oder brechen Sie ab.</translation>
+    </message>
 </context>
 <context>
     <name>ImagingHistogram</name>
@@ -1205,7 +1209,7 @@
         <translation>Kan&amp;ten</translation>
     </message>
     <message>
-        <source>Lines where the HU change most, by Canny's method</source>
+        <source>Lines where the HU change most, by Canny&apos;s method</source>
         <translation>Linien, wo sich die HU am meisten ändern, mit Cannys Verfahren</translation>
     </message>
     <message>
@@ -1251,6 +1255,18 @@
     <message>
         <source>The root sub-volumes are in %1.</source>
         <translation>Die Wurzel-Teilvolumen sind in %1.</translation>
+    </message>
+    <message>
+        <source>The last edit is taken back.</source>
+        <translation>Die letzte Bearbeitung ist zurückgenommen.</translation>
+    </message>
+    <message>
+        <source>The edit is done again.</source>
+        <translation>Die Bearbeitung ist wiederhergestellt.</translation>
+    </message>
+    <message>
+        <source>The case of the bone is removed again. The edits are still here.</source>
+        <translation>Der Fall des Knochens ist wieder gelöscht. Ihre Bearbeitungen sind noch da.</translation>
     </message>
 </context>
 <context>
@@ -1318,10 +1334,6 @@
         <translation>Die Kanten gehören nicht zum Scan. Suchen Sie sie noch einmal.</translation>
     </message>
     <message>
-        <source>CT, %1 slices, %2 × %3 pixels</source>
-        <translation>CT, %1 Schichten, %2 × %3 Pixel</translation>
-    </message>
-    <message>
         <source>, pitch %1 × %2 × %3 mm</source>
         <translation>, Abstand %1 × %2 × %3 mm</translation>
     </message>
@@ -1340,6 +1352,14 @@
     <message>
         <source>Cannot write %1. Is the disk full?</source>
         <translation>%1 kann nicht geschrieben werden. Ist die Platte voll?</translation>
+    </message>
+    <message>
+        <source>CT, 1 slice, %1 × %2 pixels</source>
+        <translation>CT, 1 Schicht, %1 × %2 Pixel</translation>
+    </message>
+    <message>
+        <source>CT, %3 slices, %1 × %2 pixels</source>
+        <translation>CT, %3 Schichten, %1 × %2 Pixel</translation>
     </message>
 </context>
 <context>
