@@ -65,6 +65,7 @@ TEST_F(ImagingSendingTest, TheServerGetsTheKeptBone) {
   EXPECT_NE(words().find("is not HOST:PORT"), std::string::npos) << words();
   // Enter sends again.
   part<QLineEdit>("address").setText(QString::fromStdString(address_));
+  EXPECT_EQ(QApplication::focusWidget(), &part<QPushButton>("send_case")) << "and not the button that closes it";
   QTest::keyClick(QApplication::focusWidget(), Qt::Key_Return);
   ASSERT_TRUE(until([&] { return at_rest(); })) << words();
   EXPECT_EQ(words(), address_ + " has the case now.");
@@ -94,6 +95,7 @@ TEST_F(ImagingSendingTest, WhoCancelsLeavesNothing) {
   EXPECT_EQ(test::names_in(cases_folder()), before);
 
   make_to_send();
+  EXPECT_TRUE(is_file(unsent_mark(new_case(before)))) << "for the next window, if this one is killed";
   escape();
   EXPECT_FALSE(asks());
   EXPECT_EQ(test::names_in(cases_folder()), before) << "nobody has sent it";
@@ -165,10 +167,11 @@ TEST_F(ImagingSendingTest, OneCaseIsSentAndOpened) {
   const std::set<std::string> before = test::names_in(cases_folder());
   make_to_send();
   const std::filesystem::path made = new_case(before);
-  const auto cases = test::names_in(cases_folder());
+  auto cases = test::names_in(cases_folder());
   make_to_send();
   QTest::mouseClick(&part<QPushButton>("make_bone"), Qt::LeftButton);
   ASSERT_TRUE(until([&] { return view_->surface_shown(); })) << said();
+  cases.erase(unsent_mark(made).filename().string());
   EXPECT_EQ(test::names_in(cases_folder()), cases);
   escape();
   EXPECT_TRUE(is_case(made)) << "it is open";

@@ -6,6 +6,7 @@
 #include <QComboBox>
 #include <QCoreApplication>
 #include <QDockWidget>
+#include <QFileDialog>
 #include <QLabel>
 #include <QListWidget>
 #include <QPushButton>
@@ -13,6 +14,7 @@
 #include <QSlider>
 #include <QSpinBox>
 #include <QTest>
+#include <QTimer>
 #include <QWheelEvent>
 #include <algorithm>
 #include <array>
@@ -332,6 +334,29 @@ TEST_F(ImagingTest, AFullDiskLosesNoEdits) {
     EXPECT_NE(refused().find("disk"), std::string::npos) << words();
     EXPECT_TRUE(list.isVisible());
   }
+}
+
+TEST_F(ImagingTest, AFolderIsAskedForBesideTheLastOne) {
+  const fs::path folder = series("ct", two_balls());
+  click("import");
+  {
+    const FolderChooser chooser(QString::fromStdString(folder.string()));
+    click("imaging_folder");
+  }
+  ASSERT_TRUE(until([&] { return idle() && part<QListWidget>("series").isVisible(); })) << words();
+  QString beside;
+  QTimer looks;
+  QObject::connect(&looks, &QTimer::timeout, [&] {
+    auto* dialog = qobject_cast<QFileDialog*>(QApplication::activeModalWidget());
+    if (dialog == nullptr) return;
+    looks.stop();
+    beside = dialog->directory().path();
+    dialog->reject();
+  });
+  looks.start(20);
+  click("imaging_folder");
+  EXPECT_EQ(beside.toStdString(), folder.parent_path().string());
+  EXPECT_TRUE(part<QListWidget>("series").isVisible()) << "nothing was chosen";
 }
 
 TEST_F(ImagingTest, EachStepCanBeCancelled) {

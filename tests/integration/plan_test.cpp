@@ -8,6 +8,7 @@
 #include <QLabel>
 #include <QLocale>
 #include <QSettings>
+#include <QStatusBar>
 #include <QTest>
 #include <algorithm>
 #include <cmath>
@@ -271,6 +272,9 @@ TEST_F(PlanTest, ClicksOnTheBoneAndKeysDrawToo) {
   const Annotation plane = planned()[1];
   ASSERT_EQ(plane.kind, AnnotationKind::plane);
   EXPECT_NEAR(std::abs(planned_direction(plane).y()), 1.0, 1e-3) << "along x, and into the axial image";
+  const QString file = QString::fromStdString((desk_->temp() / "axis.json").string());
+  bar_->save(file);
+  EXPECT_EQ(window_->statusBar()->currentMessage(), "Saved the axes to " + file + ". Planes stay in the room.");
 
   // Escape ends drawing, and clicks set the cross again.
   trigger("draw_axis");

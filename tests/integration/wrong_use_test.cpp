@@ -512,7 +512,7 @@ TEST_F(WrongUse, AnImportIsNeverTakenForAnExample) {
   // An older window has imported a scan into it.
   fs::create_directories(before);
   put_bytes(before / "case.json", R"({"title": "Right leg", "source": "DICOM CT, 9 slices"})");
-  EXPECT_EQ(case_title(before), "Right leg");
+  EXPECT_EQ(case_title(before), "Right leg (tibia)");
   EXPECT_FALSE(can_be_made_again(before)) << "its scan may be gone";
   const fs::path now = example_folder(*tibia);
   EXPECT_NE(now, before);
@@ -527,9 +527,15 @@ TEST_F(WrongUse, WhatWasLeftBehindGoesWhenTheOnlyWindowCloses) {
   const std::string needed(64, 'a'), unneeded(64, 'b'), dead = std::to_string(dead_pid()),
                                                         alive = std::to_string(::getpid());
   const fs::path cases = cases_folder(), sockets = std::getenv("XDG_RUNTIME_DIR");
-  const std::set<std::string> stay{
-      needed, "my-import", "femur.partial-" + alive, "unpack-" + alive + ".log", "notes.log", std::string(63, 'c')},
-      go{unneeded, "femur.partial-" + dead, "unpack-" + dead + ".log"};
+  const std::set<std::string> stay{needed,
+                                   "my-import",
+                                   "femur.partial-" + alive,
+                                   "unpack-" + alive + ".log",
+                                   "notes.log",
+                                   std::string(63, 'c'),
+                                   "sent",
+                                   "sent.unsent-" + alive},
+      go{unneeded, "femur.partial-" + dead, "unpack-" + dead + ".log", "unsent", "unsent.unsent-" + dead};
   fs::create_directories(cases);
   const auto put = [&](const std::string& name) {
     if (name.ends_with(".log")) return put_bytes(cases / name, "words");

@@ -12,7 +12,8 @@
 namespace osteon {
 
 namespace {
-constexpr auto kReachPatience = std::chrono::seconds(10);  // for the connection
+// For the connection, which a person waits for and can try again. A refused one may be that of a server that starts.
+constexpr auto kReachPatience = std::chrono::seconds(4);
 constexpr const char* kArchive = "case.osteon";
 }  // namespace
 

@@ -4,6 +4,7 @@
 #include <QComboBox>
 #include <QDoubleSpinBox>
 #include <QFileDialog>
+#include <QFileInfo>
 #include <QFormLayout>
 #include <QGridLayout>
 #include <QIcon>
@@ -13,6 +14,7 @@
 #include <QProgressBar>
 #include <QPushButton>
 #include <QScrollArea>
+#include <QSettings>
 #include <QSignalBlocker>
 #include <QSpinBox>
 #include <QStackedWidget>
@@ -30,6 +32,7 @@ namespace {
 constexpr double kLeastGaussian_mm = 0.05, kMostGaussian_mm = 10.0, kGaussianStep_mm = 0.1, kFirstGaussian_mm = 0.5;
 constexpr int kThresholdPause_ms = 600, kThumbnail_px = 96, kListWidth_px = 250, kListSpacing_px = 4;
 constexpr std::array kImagingWindows{kBoneWindow, kSoftTissueWindow, kWideWindow};
+constexpr const char* kLastFolderKey = "imaging/folder";
 enum ImagingStackPage { kNothingOpen, kSeriesPage, kWorkPage };
 
 // Planes and panels beside each other. A label with word wrap gives its layout a height that depends on the width. A
@@ -294,14 +297,26 @@ QBoxLayout* ImagingPage::make_side() {
   return column;
 }
 
+QString ImagingPage::ask_for_folder(QWidget* parent) {
+  QSettings settings;
+  const QString beside = settings.value(kLastFolderKey).toString();
+  const QString folder = QFileDialog::getExistingDirectory(parent, tr("The folder of a CT"), beside);
+  if (!folder.isEmpty()) settings.setValue(kLastFolderKey, QFileInfo(folder).path());
+  return folder;
+}
+
 void ImagingPage::choose_folder() {
-  const QString folder = QFileDialog::getExistingDirectory(this, tr("The folder of a CT"));
+  const QString folder = ask_for_folder(this);
   if (!folder.isEmpty()) open_source(folder);
 }
 
 void ImagingPage::choose_file() {
-  const QString file = QFileDialog::getOpenFileName(this, tr("The file of a CT"));
-  if (!file.isEmpty()) open_source(file);
+  QSettings settings;
+  const QString file =
+      QFileDialog::getOpenFileName(this, tr("The file of a CT"), settings.value(kLastFolderKey).toString());
+  if (file.isEmpty()) return;
+  settings.setValue(kLastFolderKey, QFileInfo(file).path());
+  open_source(file);
 }
 
 void ImagingPage::open_source(const QString& source) {

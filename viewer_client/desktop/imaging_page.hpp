@@ -53,6 +53,8 @@ class ImagingPage : public QWidget {
   // The scene goes before the widgets that show it.
   ~ImagingPage() override { release_scene(); }
 
+  // Asks for a folder, beside the last one. Empty: none was chosen.
+  static QString ask_for_folder(QWidget* parent);
   // A folder, zip, ISO image or file. What is open goes.
   void open_source(const QString& source);
   [[nodiscard]] bool has_scan() const { return scene_.open(); }

@@ -96,6 +96,10 @@ std::filesystem::path report_page(const std::filesystem::path& bone) { return re
 
 std::filesystem::path edit_list_of(const std::filesystem::path& bone) { return bone.string() + ".edits.yaml"; }
 
+std::filesystem::path unsent_mark(const std::filesystem::path& bone) {
+  return bone.string() + ".unsent-" + std::to_string(QCoreApplication::applicationPid());
+}
+
 void remove_unused_case(const std::filesystem::path& bone) {
   std::error_code ignored;
   const auto is_it = [&](const std::filesystem::path& needed) {

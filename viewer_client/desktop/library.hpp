@@ -50,6 +50,8 @@ void remember(const RecentEntry& entry);
 [[nodiscard]] std::filesystem::path report_page(const std::filesystem::path& bone);  // to open in a browser
 // Of the edit list of a case that image processing made: beside the case, too.
 [[nodiscard]] std::filesystem::path edit_list_of(const std::filesystem::path& bone);
+// A file beside a case that only was made to be sent by this program. After a kill, the case goes with the file.
+[[nodiscard]] std::filesystem::path unsent_mark(const std::filesystem::path& bone);
 // Removes a case with its edit list and its report, unless the start page knows a session of it.
 void remove_unused_case(const std::filesystem::path& bone);
 // Made at once, so that no other window takes the same one. If it cannot be made, it is not there.
@@ -58,7 +60,8 @@ void remove_unused_case(const std::filesystem::path& bone);
 [[nodiscard]] bool is_name_of_unpacked(std::string_view name);
 // The window has made the case by itself, of an example or of a case file, and can do so again.
 [[nodiscard]] bool can_be_made_again(const std::filesystem::path& bone);
-// The title of a case, or the name of its folder. That of an example is translated.
+// The title of a case, and the name of its folder if this window's user made it of a scan; of a case without a title
+// that name alone. The title of an example is translated.
 [[nodiscard]] QString case_title(const std::filesystem::path& bone);
 [[nodiscard]] bool is_case(const std::filesystem::path& folder);
 [[nodiscard]] bool is_file(const std::filesystem::path& path);  // a plain one

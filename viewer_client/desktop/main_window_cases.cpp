@@ -110,7 +110,7 @@ void MainWindow::choose_scan() {
   if (practice_ && imaging_->has_scan()) leave_room();  // it is kept, and the start page goes on with it
   if (!practice_ && !room_) return pages_->setCurrentWidget(imaging_);
   // Nobody leaves a room before a scan is chosen.
-  const QString folder = QFileDialog::getExistingDirectory(this, tr("The folder of a CT"));
+  const QString folder = ImagingPage::ask_for_folder(this);
   if (!folder.isEmpty()) process_images(folder);
 }
 

@@ -254,7 +254,11 @@ std::string PlanBar::drill() const {
 
 void PlanBar::save(const QString& file) const {
   const Result<void> saved = write_file(file.toStdString(), plan_text(plan_.planned(), drill()));
-  window_.say(saved ? tr("Saved %1.").arg(file) : QString::fromStdString(saved.error().message));
+  if (!saved) return window_.say(QString::fromStdString(saved.error().message));
+  // A plan has the steps of a simulated surgeon, and a plane is none.
+  const bool all =
+      std::ranges::none_of(plan_.planned(), [](const Annotation& one) { return one.kind != AnnotationKind::axis; });
+  window_.say(all ? tr("Saved %1.").arg(file) : tr("Saved the axes to %1. Planes stay in the room.").arg(file));
 }
 
 }  // namespace osteon

@@ -1,6 +1,7 @@
 #include "viewer_client/desktop/send_dialog.hpp"
 
 #include <QDialogButtonBox>
+#include <QFile>
 #include <QFormLayout>
 #include <QLabel>
 #include <QProgressBar>
@@ -50,7 +51,12 @@ SendDialog::SendDialog(std::filesystem::path what, const QString& title, Stays s
   all->addWidget(buttons);
   send_->setDefault(true);  // of the dialog, so not before it is in there
   QString first = tr("The server checks the case and keeps it. Whoever may open rooms there can send it.");
-  if (drops_) first += ' ' + stays_if_sent();
+  if (drops_) {
+    first += ' ' + stays_if_sent();
+    // If this program is killed, the next one finds it.
+    QFile mark(text_of(unsent_mark(what_)));
+    mark.open(QIODevice::WriteOnly);
+  }
   end(first);
 }
 
@@ -59,7 +65,7 @@ QString SendDialog::stays_if_sent() { return tr("On this computer the case stays
 SendDialog::~SendDialog() {
   if (sending_) {
     sending_->stop();  // it reads the case
-    drops_ = drops_ && !sending_->server_may_have_it();
+    if (sending_->server_may_have_it()) keep_it();
   }
   drop_unsent();
 }
@@ -71,13 +77,19 @@ bool SendDialog::holds(const std::filesystem::path& what) const {
 
 void SendDialog::keep(const std::filesystem::path& bone) {
   if (!drops_ || !holds(bone)) return;
-  drops_ = false;
+  keep_it();
   words_->setText(words_->text().remove(stays_if_sent()).trimmed());
 }
 
 void SendDialog::drop_unsent() {
-  // Once: another case may get its name.
-  if (std::exchange(drops_, false)) remove_unused_case(what_);
+  if (!drops_) return;
+  keep_it();  // once: another case may get its name
+  remove_unused_case(what_);
+}
+
+void SendDialog::keep_it() {
+  drops_ = false;
+  QFile::remove(text_of(unsent_mark(what_)));
 }
 
 void SendDialog::reject() {
@@ -137,7 +149,7 @@ void SendDialog::show_stage(CaseSending::Stage stage) {
 
 void SendDialog::end(const QString& sentence) {
   if (sending_) {
-    drops_ = drops_ && !sending_->server_may_have_it();
+    if (sending_->server_may_have_it()) keep_it();
     sending_.release()->deleteLater();  // it is still in its event
   }
   words_->setText(sentence);

@@ -44,6 +44,8 @@ class SendDialog : public QDialog {
   [[nodiscard]] static QString stays_if_sent();
   // A case that stays if it is sent, and was not.
   void drop_unsent();
+  // The case stays in any case.
+  void keep_it();
   void enable_parts();
 
   const std::filesystem::path what_;

@@ -17,7 +17,8 @@ namespace osteon {
 
 namespace {
 
-constexpr std::string_view kPartialMark = ".partial-", kSocketBegin = "osteon-", kLogEnding = ".log";
+constexpr std::string_view kPartialMark = ".partial-", kUnsentMark = ".unsent-", kSocketBegin = "osteon-",
+                           kLogEnding = ".log";
 
 // The number at the end of a name, if the program with this number has ended.
 bool ends_with_a_dead_program(std::string_view name) {
@@ -64,6 +65,13 @@ void StaleFiles::remove() {
       return entry.path().extension() == kLogEnding && ends_with_a_dead_program(entry.path().stem().string());
     // Without any session the settings may be lost, and not the sessions.
     return is_name_of_unpacked(name) && !needed.empty() && !needed.contains(name);
+  });
+  remove_from(cases_folder(), [](const std::filesystem::directory_entry& entry) {
+    const std::string name = entry.path().filename().string();
+    const std::size_t mark = name.find(kUnsentMark);
+    if (mark == std::string::npos || !ends_with_a_dead_program(name)) return false;
+    remove_unused_case(cases_folder() / name.substr(0, mark));
+    return true;
   });
   remove_from(sockets_, [](const std::filesystem::directory_entry& entry) {
     std::error_code ignored;

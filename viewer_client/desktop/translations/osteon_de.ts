@@ -2065,10 +2065,6 @@
         <translation>C-Bogen</translation>
     </message>
     <message>
-        <source>The folder of a CT</source>
-        <translation>Ordner eines CT</translation>
-    </message>
-    <message>
         <source>&amp;Plan</source>
         <translation>&amp;Planung</translation>
     </message>
@@ -2329,6 +2325,10 @@
     <message>
         <source>Rename…</source>
         <translation>Umbenennen…</translation>
+    </message>
+    <message>
+        <source>Saved the axes to %1. Planes stay in the room.</source>
+        <translation>Die Achsen sind in %1 gespeichert. Ebenen bleiben im Raum.</translation>
     </message>
 </context>
 <context>
