@@ -24,6 +24,7 @@ namespace {
 using namespace std::chrono_literals;
 
 constexpr std::size_t kArchiveBytes = 3'000'001;
+constexpr int kPatience_ms = 10'000;
 
 class FakeCases final : public v1::CaseService::Service {
  public:
@@ -32,6 +33,9 @@ class FakeCases final : public v1::CaseService::Service {
     if (!refusal.ok()) return refusal;
     v1::UploadCaseRequest request;
     while (reader->Read(&request)) received += request.data();
+    // The data of a cancelled call ends a moment before the call is known to be cancelled.
+    for (int i = 0; received.size() < kArchiveBytes && !context->IsCancelled() && i < kPatience_ms; ++i)
+      std::this_thread::sleep_for(1ms);
     has_all = !context->IsCancelled();
     while (holds && !context->IsCancelled()) std::this_thread::sleep_for(1ms);
     was_cancelled = context->IsCancelled();
