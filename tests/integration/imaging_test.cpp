@@ -110,6 +110,9 @@ TEST_F(ImagingTest, FromAFolderToADrillableBoneInTenClicks) {
   choose_series(list);
   ASSERT_TRUE(until([&] { return found(2); })) << words();
   EXPECT_FALSE(part<QPushButton>("make_bone").isEnabled());
+  const QImage ball_seen = islands().item(0)->icon().pixmap(28, 28).toImage();
+  EXPECT_EQ(qAlpha(ball_seen.pixel(14, 14)), 255);
+  EXPECT_EQ(qAlpha(ball_seen.pixel(1, 1)), 0) << "beside the ball";
 
   // The planes go through one of the balls.
   EXPECT_TRUE(label("readout").startsWith("1000 HU")) << label("readout").toStdString();

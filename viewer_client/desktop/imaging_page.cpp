@@ -30,7 +30,8 @@ namespace osteon {
 namespace {
 
 constexpr double kLeastGaussian_mm = 0.05, kMostGaussian_mm = 10.0, kGaussianStep_mm = 0.1, kFirstGaussian_mm = 0.5;
-constexpr int kThresholdPause_ms = 600, kThumbnail_px = 96, kListWidth_px = 250, kListSpacing_px = 4;
+constexpr int kThresholdPause_ms = 600, kThumbnail_px = 96, kListWidth_px = 250, kListSpacing_px = 4,
+              kIslandIcon_px = 28;
 constexpr std::array kImagingWindows{kBoneWindow, kSoftTissueWindow, kWideWindow};
 constexpr const char* kLastFolderKey = "imaging/folder";
 enum ImagingStackPage { kNothingOpen, kSeriesPage, kWorkPage };
@@ -57,10 +58,17 @@ QString island_text(const ListedIsland& island) {
       .arg(kind_text(island.kind), QLocale().toString(island.volume_cm3, 'f', 2));
 }
 
-QIcon colour_icon(const Tint& tint) {
-  QPixmap square(12, 12);
-  square.fill(QColor(tint.red, tint.green, tint.blue));
-  return {square};
+// The island from the front, in the tint that it has on the planes.
+QIcon icon_of(const IslandPicture& picture, const Tint& tint) {
+  QImage image(picture.side_px, picture.side_px, QImage::Format_ARGB32);
+  image.fill(Qt::transparent);
+  for (int row = 0; row < picture.side_px; ++row)
+    for (int column = 0; column < picture.side_px; ++column) {
+      const int grey = picture.greys[static_cast<std::size_t>(row * picture.side_px + column)];
+      if (grey == 0) continue;
+      image.setPixel(column, row, qRgb(tint.red * grey / 255, tint.green * grey / 255, tint.blue * grey / 255));
+    }
+  return {QPixmap::fromImage(image)};
 }
 
 }  // namespace
@@ -263,6 +271,7 @@ QBoxLayout* ImagingPage::make_side() {
   island_list_->setObjectName("islands");
   island_list_->setAccessibleName(tr("Parts of bone"));
   island_list_->setMinimumWidth(kListWidth_px);
+  island_list_->setIconSize({kIslandIcon_px, kIslandIcon_px});
   connect(island_list_, &QListWidget::itemChanged, this, [this](QListWidgetItem* item) { change_island(item); });
   column->addWidget(island_list_, 1);
   find_ = add_button(*column, tr("Find the parts"), "find_parts", tr("Finds the parts that reach the threshold"),
@@ -539,7 +548,7 @@ void ImagingPage::refresh_list() {
     auto* item = island_list_->item(static_cast<int>(i));
     if (item == nullptr) item = new QListWidgetItem(island_list_);
     item->setText(island_text(islands_[i]));
-    item->setIcon(colour_icon(tint));
+    item->setIcon(icon_of(islands_[i].picture, tint));
     item->setCheckState(keep ? Qt::Checked : Qt::Unchecked);
   }
   filling_ = false;

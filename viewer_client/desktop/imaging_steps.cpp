@@ -23,6 +23,7 @@ constexpr const char* kEdgeFile = "edges.nrrd";
 constexpr const char* kKeptFile = "kept.nrrd";
 constexpr const char* kBoxFile = "box.edits.yaml";
 constexpr const char* kPictures = "pictures";
+constexpr int kIslandPicture_px = 56;  // as the list shows them on a screen of double density
 // Files with one scan by the ends of their names. What is inside decides in osteon-import.
 constexpr const char* kOneScan[] = {".nii", ".nii.gz", ".nrrd", ".nhdr", ".mha", ".mhd", ".inv3"};
 
@@ -67,7 +68,7 @@ ListedSeries listed_series(const QJsonObject& of, int taken, const QString& pict
   return series;
 }
 
-std::vector<ListedIsland> listed_islands(const QString& said) {
+std::vector<ListedIsland> listed_islands(const QString& said, std::vector<IslandPicture> pictures) {
   std::vector<ListedIsland> islands;
   for (const QJsonValue& value : QJsonDocument::fromJson(said.toUtf8()).object()["islands"].toArray()) {
     const QJsonObject of = value.toObject();
@@ -75,7 +76,8 @@ std::vector<ListedIsland> listed_islands(const QString& said) {
     const int number = of["number"].toInt();
     if (number < 1 || number > std::numeric_limits<std::uint8_t>::max()) continue;  // voxels have a byte for it
     islands.push_back({number, of["kind"].toString().toStdString(), of["volume_cm3"].toDouble(),
-                       of["density_g_cm3"].toDouble(), Vec3(at[0].toDouble(), at[1].toDouble(), at[2].toDouble())});
+                       of["density_g_cm3"].toDouble(), Vec3(at[0].toDouble(), at[1].toDouble(), at[2].toDouble()),
+                       std::move(pictures[static_cast<std::size_t>(number)])});
   }
   return islands;
 }
@@ -240,13 +242,14 @@ void ImagingSteps::read_islands(const QString& said, const ScanGeometry& scan) {
   in_background(
       [this, scan] {
         auto numbers = read_number_file(scratch_ / kIslandFile);
+        if (numbers) island_pictures_ = island_pictures(*numbers, kIslandPicture_px);
         islands_ =
             numbers ? IslandMap::make(scan, std::move(*numbers)) : Result<IslandMap>(tl::unexpected(numbers.error()));
       },
       [this, said] {
         Result<IslandMap> map = std::exchange(islands_, IslandMap());
         if (!map) return fail(QString::fromStdString(map.error().message));
-        events_.found(listed_islands(said), std::move(*map));
+        events_.found(listed_islands(said, std::move(island_pictures_)), std::move(*map));
       });
 }
 

@@ -98,6 +98,7 @@ class ImagingSteps : public QObject {
   Result<ShownScan> scan_;
   HuHistogram histogram_;  // of the scan
   Result<IslandMap> islands_;
+  std::vector<IslandPicture> island_pictures_;
   Result<VoxelFile<std::uint8_t>> edges_;
   Result<void> kept_;
   std::unique_ptr<QThread> loader_;

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "viewer_client/imaging/island_pictures.hpp"
 #include "viewer_client/imaging/scan_file.hpp"
 
 namespace osteon {
@@ -18,6 +19,7 @@ struct ListedIsland {
   std::string kind;  // bone, table, cast, metal or contrast
   double volume_cm3 = 0.0, density_g_cm3 = 0.0;
   Vec3 centre_mm = Vec3::Zero();
+  IslandPicture picture;  // the window makes it
 };
 
 // A part of a scan, with the island of each of its voxels.
