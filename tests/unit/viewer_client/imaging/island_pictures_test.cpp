@@ -8,6 +8,16 @@ namespace osteon {
 namespace {
 
 constexpr int kSide_px = 8;
+// An L from the front, 8 mm wide and 16 mm high. Its foot lies to the left and farther back.
+constexpr const char* kL =
+    "..#.....\n"
+    "..#.....\n"
+    "..#.....\n"
+    "..#.....\n"
+    "..#.....\n"
+    "..#.....\n"
+    "..#---..\n"
+    "..#---..\n";
 
 // x to the patient's left, y to the back, z to the head.
 VoxelFile<std::uint8_t> scan_of(const std::array<int, 3>& dims, const Vec3& step_mm) {
@@ -38,22 +48,13 @@ std::string drawn(const IslandPicture& picture) {
   return text;
 }
 
-// An L from the front: its upright on the patient's right, its foot to the left and farther back. Slices are 2 mm.
+// Slices are 2 mm.
 TEST(IslandPictures, AreSeenFromTheFrontAsLargeAsTheyFit) {
   auto numbers = scan_of({40, 30, 20}, {1.0, 1.0, 2.0});
   fill(numbers, 3, {10, 5, 4}, {11, 5, 11});
   fill(numbers, 3, {12, 9, 4}, {17, 9, 5});
   const auto pictures = island_pictures(numbers, kSide_px);
-  // 8 mm wide and 16 mm high: in the middle 4 of 8 pixels.
-  EXPECT_EQ(drawn(pictures[3]),
-            "..#.....\n"
-            "..#.....\n"
-            "..#.....\n"
-            "..#.....\n"
-            "..#.....\n"
-            "..#.....\n"
-            "..#---..\n"
-            "..#---..\n");
+  EXPECT_EQ(drawn(pictures[3]), kL);
   EXPECT_TRUE(pictures[0].greys.empty());
   EXPECT_TRUE(pictures[2].greys.empty());
 }
@@ -62,15 +63,7 @@ TEST(IslandPictures, OfAMirroredScanAreThoseOfTheSameBone) {
   auto numbers = scan_of({40, 30, 20}, {-1.0, -1.0, -2.0});
   fill(numbers, 3, {28, 24, 8}, {29, 24, 15});
   fill(numbers, 3, {22, 20, 14}, {27, 20, 15});
-  EXPECT_EQ(drawn(island_pictures(numbers, kSide_px)[3]),
-            "..#.....\n"
-            "..#.....\n"
-            "..#.....\n"
-            "..#.....\n"
-            "..#.....\n"
-            "..#.....\n"
-            "..#---..\n"
-            "..#---..\n");
+  EXPECT_EQ(drawn(island_pictures(numbers, kSide_px)[3]), kL);
 }
 
 TEST(IslandPictures, OfOneVoxelFillTheirSquare) {
