@@ -86,7 +86,7 @@ class ImagingBoxesTest : public test::ImagingBench {
     const bool upright = std::abs(to.x() - from.x()) > std::abs(to.y() - from.y());
     for (int across = -2; across <= 2; ++across)
       for (int along = -4; along <= 4; ++along) {
-        const QColor colour = image.pixelColor(middle + (upright ? QPoint(across, along) : QPoint(along, across)));
+        QColor colour = image.pixelColor(middle + (upright ? QPoint(across, along) : QPoint(along, across)));
         for (const auto& [red, green, blue] : {kSectionColour, kChosenColour})
           if (colour == QColor(red, green, blue)) return colour;
       }
@@ -97,8 +97,8 @@ class ImagingBoxesTest : public test::ImagingBench {
     int pixels = 0, top = 0;
   };
   [[nodiscard]] Orange orange() const {
-    auto* solid = dynamic_cast<ImagingSolid*>(window_->findChild<QWidget*>("solid"));
-    const Image image = solid->view().scene().image();
+    auto& solid = dynamic_cast<ImagingSolid&>(part<QWidget>("solid"));
+    const Image image = solid.view().scene().image();
     Orange seen;
     for (int y = 0; y < image.height_px; ++y)
       for (int x = 0; x < image.width_px; ++x) {

@@ -309,7 +309,7 @@ QBoxLayout* ImagingPage::make_side() {
 QString ImagingPage::ask_for_folder(QWidget* parent) {
   QSettings settings;
   const QString beside = settings.value(kLastFolderKey).toString();
-  const QString folder = QFileDialog::getExistingDirectory(parent, tr("The folder of a CT"), beside);
+  QString folder = QFileDialog::getExistingDirectory(parent, tr("The folder of a CT"), beside);
   if (!folder.isEmpty()) settings.setValue(kLastFolderKey, QFileInfo(folder).path());
   return folder;
 }

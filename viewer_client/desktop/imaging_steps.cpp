@@ -70,7 +70,7 @@ ListedSeries listed_series(const QJsonObject& of, int taken, const QString& pict
 
 std::vector<ListedIsland> listed_islands(const QString& said, std::vector<IslandPicture> pictures) {
   std::vector<ListedIsland> islands;
-  for (const QJsonValue& value : QJsonDocument::fromJson(said.toUtf8()).object()["islands"].toArray()) {
+  for (const auto& value : QJsonDocument::fromJson(said.toUtf8()).object()["islands"].toArray()) {
     const QJsonObject of = value.toObject();
     const QJsonArray at = of["centre_mm"].toArray();
     const int number = of["number"].toInt();
@@ -175,7 +175,7 @@ void ImagingSteps::open(const QString& source) {
 void ImagingSteps::read_series(const QString& said) {
   const QJsonObject report = QJsonDocument::fromJson(said.toUtf8()).object();
   std::vector<ListedSeries> series;
-  for (const QJsonValue& value : report["series"].toArray())
+  for (const auto& value : report["series"].toArray())
     series.push_back(listed_series(value.toObject(), report["taken"].toInt(), scratch_file(kPictures)));
   if (series.empty()) return fail(tr("%1 has no CT series. Open another folder or file.").arg(source_));
   events_.listed(series);

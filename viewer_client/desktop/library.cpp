@@ -145,7 +145,8 @@ bool is_case(const std::filesystem::path& folder) {
 QString case_title(const std::filesystem::path& bone) {
   for (const ExampleBone& example : example_bones())
     if (bone == example_folder(example)) return example.title;
-  const QString title = text_in_case(bone, "title"), folder = text_of(bone.filename());
+  const QString title = text_in_case(bone, "title");
+  QString folder = text_of(bone.filename());
   if (title.isEmpty()) return folder;
   // Most scans have the title "CT", but each a folder of its own.
   const bool made_here = bone.parent_path() == cases_folder() && !is_name_of_unpacked(bone.filename().string());

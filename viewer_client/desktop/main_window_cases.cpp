@@ -192,7 +192,7 @@ void MainWindow::send_case(const std::filesystem::path& what) {
 QString MainWindow::send_made_case(const std::filesystem::path& bone) {
   // Begun from the menu while the case was made. That work is not thrown away.
   if (sends_already()) {
-    const QString next = tr("Another case is being sent. The new one is in %1; send it after that.").arg(text_of(bone));
+    QString next = tr("Another case is being sent. The new one is in %1; send it after that.").arg(text_of(bone));
     say(next);
     return next;
   }

@@ -216,7 +216,7 @@ QString PlanBar::new_name() const {
   const std::vector<Annotation> planned = plan_.planned();
   const QString form = plan_.kind() == AnnotationKind::axis ? tr("Axis %1") : tr("Plane %1");
   for (int number = 1;; ++number) {
-    const QString name = form.arg(number);
+    QString name = form.arg(number);
     if (std::ranges::find(planned, name.toStdString(), &Annotation::words) == planned.end()) return name;
   }
 }
