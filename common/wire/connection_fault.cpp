@@ -81,10 +81,13 @@ class Diagnosis {
   [[nodiscard]] bool is_plain() const { return folder_.empty(); }
 
   [[nodiscard]] ConnectionFault not_connected() const {
-    if (probe_.is_refused)
-      return for_now("nothing listens at " + address_ +
-                     ", though a machine answers there; start osteon-server on it, or " +
-                     "give with --server the address that it printed");
+    if (probe_.is_refused) {
+      ConnectionFault refused = for_now("nothing listens at " + address_ +
+                                        ", though a machine answers there; start osteon-server on it, or " +
+                                        "give with --server the address that it printed");
+      refused.refused = true;
+      return refused;
+    }
     if (probe_.is_silent)
       return for_now("no machine answers at " + address_ +
                      "; see whether it is on, whether a firewall lets that port " +

@@ -9,8 +9,9 @@
 namespace osteon::wire {
 
 struct ConnectionFault {
-  Error error;         // one sentence: what is wrong, and the remedy
-  bool lasts = false;  // waiting does not help
+  Error error;           // one sentence: what is wrong, and the remedy
+  bool lasts = false;    // waiting does not help
+  bool refused = false;  // nothing listens there; a server may be about to
 };
 // `address`: HOST:PORT, where a connection with `credentials` has just failed. Takes at most three seconds. Sends no
 // call and no ticket. deploy/docs/troubleshooting.md lists the sentences. When `stop` returns true, it returns soon,

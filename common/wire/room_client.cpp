@@ -125,8 +125,8 @@ Error error_of(const grpc::Status& status, const std::string& server) {
 }
 
 Result<std::shared_ptr<grpc::Channel>> reach(const std::string& address, const std::shared_ptr<const RoomName>& room,
-                                             ClientKind kind, std::chrono::milliseconds patience,
-                                             const std::function<bool()>& stop, const ClientCredentials& credentials) {
+                                             ClientKind kind, ReachPatience patience, const std::function<bool()>& stop,
+                                             const ClientCredentials& credentials) {
   if (!is_server_address(address))
     return failure(ErrorCode::invalid_input, "the server's address " + address +
                                                  " is not HOST:PORT; give the one that osteon-server prints, such as " +
@@ -135,7 +135,8 @@ Result<std::shared_ptr<grpc::Channel>> reach(const std::string& address, const s
   if (!security) return tl::unexpected(security.error());
   std::shared_ptr<grpc::Channel> channel = make_channel(address, *security, kind, room, credentials);
   // Waits in short intervals, so that the caller can stop.
-  const auto until = Clock::now() + patience;
+  const auto begin = Clock::now();
+  auto until = begin + patience.all;
   bool has_looked = false;
   while (!channel->WaitForConnected(std::chrono::system_clock::now() + 50ms)) {
     if (stop && stop()) return failure(ErrorCode::cancelled, "stopped before the server at " + address + " answered");
@@ -147,6 +148,7 @@ Result<std::shared_ptr<grpc::Channel>> reach(const std::string& address, const s
     ConnectionFault fault = connection_fault(address, credentials, stop);
     if (stop && stop()) continue;
     if (is_over || fault.lasts) return tl::unexpected(std::move(fault.error));
+    if (fault.refused) until = std::min(until, begin + patience.refused);
   }
   return channel;
 }
@@ -220,16 +222,15 @@ std::optional<Error> error_of_http(const std::string& said, const std::string& s
                                            "); give with --server the port that osteon-server printed"};
 }
 
-Result<std::shared_ptr<grpc::Channel>> reach_server(const std::string& address, ClientKind kind,
-                                                    std::chrono::milliseconds patience,
+Result<std::shared_ptr<grpc::Channel>> reach_server(const std::string& address, ClientKind kind, ReachPatience patience,
                                                     const std::function<bool()>& stop,
                                                     const ClientCredentials& credentials) {
   return reach(address, nullptr, kind, patience, stop, credentials);
 }
 
 Result<JoinedRoom> join_room(const std::string& address, ClientKind kind, const std::string& name,
-                             std::chrono::milliseconds patience, const std::function<bool()>& stop,
-                             const std::string& named, const ClientCredentials& credentials) {
+                             ReachPatience patience, const std::function<bool()>& stop, const std::string& named,
+                             const ClientCredentials& credentials) {
   const auto calls_to = std::make_shared<RoomName>(named);  // shared with the channel
   Result<std::shared_ptr<grpc::Channel>> channel = reach(address, calls_to, kind, patience, stop, credentials);
   if (!channel) return tl::unexpected(channel.error());

@@ -38,11 +38,20 @@ struct JoinedRoom {
   std::string secret;  // proves that a later connection belongs to this one
 };
 
+// How long a client tries to connect. A refusal comes at once: nothing listens there, but a server may be about to.
+struct ReachPatience {
+  // Not explicit: most callers wait as long for either.
+  template <class Rep, class Period>
+  ReachPatience(std::chrono::duration<Rep, Period> each) : all(each), refused(each) {}
+  ReachPatience(std::chrono::milliseconds any, std::chrono::milliseconds a_refusal) : all(any), refused(a_refusal) {}
+  std::chrono::milliseconds all, refused;
+};
+
 // A channel to the server that names no room. Errors: invalid_input (`address` is not HOST:PORT), those of
 // connection_fault (no connection within `patience`, or waiting does not help), cancelled (`stop` returned true), and
 // those of channel_credentials.
 [[nodiscard]] Result<std::shared_ptr<grpc::Channel>> reach_server(const std::string& address, ClientKind kind,
-                                                                  std::chrono::milliseconds patience,
+                                                                  ReachPatience patience,
                                                                   const std::function<bool()>& stop,
                                                                   const ClientCredentials& credentials = {});
 
@@ -50,7 +59,7 @@ struct JoinedRoom {
 // reach_server, unsupported (protocol or kernel versions differ, or the room is closed), not_found (there is no such
 // room), denied (the person, ticket or role is not admitted).
 [[nodiscard]] Result<JoinedRoom> join_room(const std::string& address, ClientKind kind, const std::string& name,
-                                           std::chrono::milliseconds patience, const std::function<bool()>& stop,
+                                           ReachPatience patience, const std::function<bool()>& stop,
                                            const std::string& room = {}, const ClientCredentials& credentials = {});
 
 // Joins again as the same author over the same channel, after the stream or the server was lost. `kept`: the newest

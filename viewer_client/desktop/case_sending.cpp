@@ -12,8 +12,8 @@
 namespace osteon {
 
 namespace {
-// For the connection, which a person waits for and can try again. A refused one may be that of a server that starts.
-constexpr auto kReachPatience = std::chrono::seconds(4);
+// For the connection. Where nothing listens, a server may be about to start.
+constexpr std::chrono::seconds kReachPatience{10}, kRefusedPatience{1};
 constexpr const char* kArchive = "case.osteon";
 }  // namespace
 
@@ -105,8 +105,8 @@ void CaseSending::work(const std::filesystem::path& archive) {
   };
   // As the administrator's program: while the server checks, a slow answer is awaited.
   const auto channel = wire::reach_server(
-      to_.address.toStdString(), wire::ClientKind::haptic, kReachPatience, [this] { return cancelled_.load(); },
-      to_.credentials);
+      to_.address.toStdString(), wire::ClientKind::haptic, {kReachPatience, kRefusedPatience},
+      [this] { return cancelled_.load(); }, to_.credentials);
   if (!channel) return failed(channel.error());
   show(Stage::sending);
   const auto stored = wire::upload_case(*channel, archive, keep_going());

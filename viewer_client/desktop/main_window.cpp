@@ -27,6 +27,7 @@
 #include <QStatusBar>
 #include <QUrl>
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <initializer_list>
 #include <span>
@@ -59,6 +60,7 @@ namespace osteon {
 
 namespace {
 
+constexpr std::chrono::seconds kJoinRefusedPatience{1};  // where nothing listens, a server may be about to start
 constexpr int kGaugePeriod_ms = 50;
 // The pointer also sends while it rests, so that the haptic client knows that the window lives.
 constexpr int kPointerPeriod_ms = 50;
@@ -363,6 +365,7 @@ void MainWindow::enter_room(const RoomAddress& room) {
   options.room = room.room.toStdString();
   options.credentials = room.credentials;
   if (!room.name.isEmpty()) options.name = room.name.toStdString();
+  options.refused_patience = kJoinRefusedPatience;
   options.keep_trying = true;
   options.cache = data_folder() / "cache";  // that of the haptic client too
   options.first_look = [width = std::max(1, view_->width()), height = std::max(1, view_->height())](const Box& bone) {

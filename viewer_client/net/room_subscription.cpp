@@ -190,7 +190,7 @@ struct RoomSubscription::Impl {
       : options(std::move(o)), render_queue(i), asked_to_stop(std::move(s)) {}
 
   bool stopping() const { return ending.load() || asked_to_stop(); }
-  Result<void> join(std::chrono::milliseconds patience);
+  Result<void> join(wire::ReachPatience patience);
   Result<void> rejoin();
   void read_mesh();
   void read_cutting();
@@ -226,7 +226,7 @@ struct RoomSubscription::Impl {
   void leave(Slot slot);
 };
 
-Result<void> RoomSubscription::Impl::join(std::chrono::milliseconds patience) {
+Result<void> RoomSubscription::Impl::join(wire::ReachPatience patience) {
   auto answer = wire::join_room(
       options.address, wire::ClientKind::viewer, options.name, patience, [this] { return stopping(); }, options.room,
       options.credentials);
@@ -494,7 +494,8 @@ Result<std::unique_ptr<RoomSubscription>> RoomSubscription::start(const RoomSubs
                                                                   RenderQueue& render_queue,
                                                                   std::function<bool()> stop) {
   auto impl = std::make_unique<Impl>(options, render_queue, std::move(stop));
-  if (Result<void> first = impl->join(options.patience); !first) return tl::unexpected(first.error());
+  if (Result<void> first = impl->join({options.patience, options.refused_patience}); !first)
+    return tl::unexpected(first.error());
   const wire::JoinedRoom joined = impl->newest_join();
   impl->room = {joined.case_title, joined.pitch_mm, joined.bounds};
   if (options.first_look) {

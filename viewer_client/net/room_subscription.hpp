@@ -30,6 +30,8 @@ struct RoomSubscriptionOptions {
   wire::ClientCredentials credentials{};
   std::string name = "viewer";  // shown to others
   std::chrono::milliseconds patience{5000};
+  // For the first connection, where nothing listens. Where something does, `patience` counts.
+  std::chrono::milliseconds refused_patience = patience;
   // The window's first view of a bone with these bounds. None: the whole bone in full detail.
   std::function<ViewFrustum(const Box&)> first_look{};
   bool keep_trying = false;  // after a lost connection: retry without end, not only for `patience`

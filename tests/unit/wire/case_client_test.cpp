@@ -1,8 +1,12 @@
 // Sending a case, against a server that keeps the bytes, refuses, waits or ends.
 #include "common/wire/case_client.hpp"
 
+#include <arpa/inet.h>
 #include <grpcpp/grpcpp.h>
 #include <gtest/gtest.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <atomic>
@@ -14,6 +18,7 @@
 #include <utility>
 #include <vector>
 
+#include "common/wire/room_client.hpp"
 #include "osteon/v1/cases.grpc.pb.h"
 #include "osteon/v1/rooms.grpc.pb.h"
 #include "tests/support/temp_dir.hpp"
@@ -195,6 +200,63 @@ TEST_F(CaseClientTest, ARoomIsAskedForByNameAndCase) {
   ASSERT_FALSE(lost);
   EXPECT_NE(lost.error().message.find("it may be open"), std::string::npos) << lost.error().message;
   EXPECT_EQ(lost.error().message.find("Socket"), std::string::npos) << lost.error().message;
+}
+
+// A port that the test holds, and on which nobody listens.
+class SilentPort {
+ public:
+  SilentPort() : socket_(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0)) {
+    sockaddr_in at{};
+    at.sin_family = AF_INET;
+    at.sin_addr.s_addr = ::htonl(INADDR_LOOPBACK);
+    socklen_t size = sizeof at;
+    EXPECT_EQ(::bind(socket_, reinterpret_cast<const sockaddr*>(&at), size), 0);
+    EXPECT_EQ(::getsockname(socket_, reinterpret_cast<sockaddr*>(&at), &size), 0);
+    address_ = "127.0.0.1:" + std::to_string(::ntohs(at.sin_port));
+  }
+  ~SilentPort() { release(); }
+  SilentPort(const SilentPort&) = delete;
+  SilentPort& operator=(const SilentPort&) = delete;
+  void release() {
+    if (socket_ >= 0) ::close(std::exchange(socket_, -1));
+  }
+  [[nodiscard]] const std::string& address() const { return address_; }
+
+ private:
+  int socket_;
+  std::string address_;
+};
+
+TEST(Reach, ARefusalIsSaidThoughASlowServerWouldGetMoreTime) {
+  const SilentPort port;
+  // It asks in each interval of its wait, so it is stopped if it waits for much longer than a refusal takes.
+  int asked = 0;
+  const auto reached =
+      reach_server(port.address(), ClientKind::viewer, {10min, 0ms}, [&asked] { return ++asked > 400; });
+  ASSERT_FALSE(reached);
+  EXPECT_EQ(reached.error().code, ErrorCode::unavailable) << reached.error().message;
+  EXPECT_NE(reached.error().message.find("nothing listens at " + port.address()), std::string::npos)
+      << reached.error().message;
+}
+
+TEST(Reach, AServerThatBeginsAfterARefusalIsReached) {
+  SilentPort port;
+  FakeCases cases;
+  std::unique_ptr<grpc::Server> server;
+  int asked = 0;
+  const auto reached = reach_server(port.address(), ClientKind::viewer, {10min, 5min}, [&] {
+    constexpr int kRefused = 20;  // times that it has asked when it has been refused
+    if (++asked == kRefused) {
+      port.release();
+      grpc::ServerBuilder builder;
+      builder.AddListeningPort(port.address(), grpc::InsecureServerCredentials());
+      builder.RegisterService(&cases);
+      server = builder.BuildAndStart();
+    }
+    return asked > 400;
+  });
+  ASSERT_NE(server, nullptr);
+  EXPECT_TRUE(reached) << reached.error().message;
 }
 
 }  // namespace
