@@ -30,7 +30,9 @@ int main(int argc, char** argv) {
   import::add_subvolume_command(app, commands);
   if (const auto code = parse_arguments(app, argc, argv)) return *code;
 
-  const StopSignal stop;
+  // Never destroyed: a signal during the exit would make a success, whose files have their names already, look like a
+  // failure that left nothing.
+  static const StopSignal& stop = *new StopSignal;
   const auto chosen =
       std::ranges::find_if(commands, [](const import::Command& command) { return command.app->parsed(); });
   const auto text = chosen->run(stop);

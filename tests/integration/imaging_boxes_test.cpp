@@ -2,6 +2,8 @@
 // boxes, and the files are those of osteon-import.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <signal.h>
+#include <unistd.h>
 
 #include <QCoreApplication>
 #include <QDialog>
@@ -15,6 +17,8 @@
 #include <algorithm>
 #include <chrono>
 #include <cstdlib>
+#include <set>
+#include <string>
 #include <system_error>
 #include <vector>
 
@@ -22,6 +26,7 @@
 #include "common/runtime/files.hpp"
 #include "tests/integration/full_disk.hpp"
 #include "tests/integration/imaging_bench.hpp"
+#include "tests/support/content.hpp"
 #include "tests/support/process.hpp"
 #include "tests/support/wait.hpp"
 #include "viewer_client/desktop/imaging_solid.hpp"
@@ -220,6 +225,27 @@ TEST_F(ImagingBoxesTest, WhileItWritesNothingElseEndsIt) {
   }
   QTest::keyClick(&dialog, Qt::Key_Escape);
   EXPECT_FALSE(dialog.isVisible());
+}
+
+// It stands still, so the window that closes kills it.
+TEST_F(ImagingBoxesTest, AKilledImporterLeavesNoPartOfTheFiles) {
+  const fs::path to = desk_->temp() / "killed";
+  fs::create_directories(to);
+  write(to);
+  std::vector<pid_t> importers;
+  ASSERT_TRUE(test::wait_until(
+      [&] {
+        QCoreApplication::processEvents();
+        importers = test::children("osteon-import");
+        return !importers.empty();
+      },
+      30s));
+  ASSERT_EQ(::kill(importers.front(), SIGSTOP), 0);
+  fs::create_directories(to / ("sub-volumes.partial-" + std::to_string(importers.front())));
+  fs::create_directories(to / ("sub-volumes.partial-" + std::to_string(::getpid())));
+  window_.reset();
+  EXPECT_EQ(test::names_in(to), (std::set<std::string>{"sub-volumes.partial-" + std::to_string(::getpid())}))
+      << "that of another program that lives stays";
 }
 
 TEST_F(ImagingBoxesTest, TheFilesAreThoseOfTheImporter) {

@@ -12,6 +12,8 @@
 #include <system_error>
 #include <utility>
 
+#include "viewer_client/desktop/stale_files.hpp"
+
 namespace osteon {
 
 namespace {
@@ -94,6 +96,7 @@ ImagingSteps::~ImagingSteps() {
   cancelled_ = true;
   if (loader_) loader_->wait();
   run_.reset();
+  if (!boxes_.empty()) remove_partials(boxes_);  // a run that does not end in time is killed
   const bool unfinished = maker_ != nullptr;
   maker_.reset();
   std::error_code ignored;
@@ -271,6 +274,7 @@ void ImagingSteps::find_edges(const ScanGeometry& scan) {
 void ImagingSteps::write_boxes(const ScanGeometry& scan, const IslandMap& islands, const KeptParts& kept,
                                double threshold_hu, int subdivisions, const std::filesystem::path& folder) {
   cancelled_ = false;
+  boxes_ = folder;
   const QStringList arguments{"report",         scratch_file(shown_file_),
                               "--bone",         scratch_file(kKeptFile),
                               "--threshold",    QString::number(threshold_hu, 'g', 17),

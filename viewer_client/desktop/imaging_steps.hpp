@@ -91,6 +91,7 @@ class ImagingSteps : public QObject {
   std::optional<int> series_;
   const char* shown_file_;              // in the scratch folder: the scan, or a filtered one
   std::filesystem::path out_;           // the case that is made
+  std::filesystem::path boxes_;         // the folder of sub-volumes that was written last
   std::atomic<bool> cancelled_{false};  // the other thread asks, too
   std::unique_ptr<ImporterRun> run_;
   std::unique_ptr<CaseMaker> maker_;

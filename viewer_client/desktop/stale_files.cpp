@@ -80,6 +80,14 @@ void StaleFiles::remove() {
   });
 }
 
+void remove_partials(const std::filesystem::path& path) {
+  const std::string begin = path.filename().string() + std::string(kPartialMark);
+  remove_from(path.parent_path(), [&](const std::filesystem::directory_entry& entry) {
+    const std::string name = entry.path().filename().string();
+    return name.starts_with(begin) && ends_with_a_dead_program(name);
+  });
+}
+
 std::filesystem::path socket_path(const std::filesystem::path& sockets, const char* use) {
   return sockets / (std::string(kSocketBegin) + use + "-" + std::to_string(::getpid()));
 }

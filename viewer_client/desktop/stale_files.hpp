@@ -25,6 +25,9 @@ class StaleFiles {
   std::unique_ptr<FileLock> windows_;  // shared by all windows
 };
 
+// What programs that were killed have left of a folder or file that they were making.
+void remove_partials(const std::filesystem::path& path);
+
 // The socket of this program's window for a client; `use` is "pointer" or "sound".
 [[nodiscard]] std::filesystem::path socket_path(const std::filesystem::path& sockets, const char* use);
 

@@ -1,5 +1,8 @@
 // osteon-import as its users see it: what it prints, what files it leaves, and its exit codes.
+#include <fcntl.h>
 #include <sys/stat.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include <csignal>
 #include <fstream>
@@ -10,6 +13,7 @@
 #include "server/import/dicom_writer.hpp"
 #include "tests/support/process.hpp"
 #include "tests/support/temp_dir.hpp"
+#include "tests/support/wait.hpp"
 #include "tests/unit/import/fixtures.hpp"
 
 namespace osteon::import {
@@ -173,6 +177,40 @@ TEST_F(Program, MakesAPhantomAndReportsIt) {
   EXPECT_EQ(to_hex(loaded->hash()), hash);
   const auto text = test::run(kProgram, {"info", path("case")});
   EXPECT_EQ(text.out, made.out);
+}
+
+// The pipe of its output is full, so the program has done its work and cannot end.
+TEST_F(Program, ASignalAfterTheWorkLeavesASuccess) {
+  ASSERT_EQ(test::run(kProgram, {"phantom", "block", "--layers", "3:1.9", "--width", "8", "--pitch", "0.5", "--out",
+                                 path("truth"), "--dicom", path("series")})
+                .exit_code,
+            0);
+  int ends[2];
+  ASSERT_EQ(::pipe2(ends, O_CLOEXEC | O_NONBLOCK), 0);
+  const std::string filling(4096, ' ');
+  while (::write(ends[1], filling.data(), filling.size()) > 0) {
+  }
+  ASSERT_EQ(::fcntl(ends[1], F_SETFL, 0), 0);
+  const std::string program = kProgram.string(), series = path("series"), out = path("report");
+  const pid_t child = ::fork();
+  if (child == 0) {
+    ::dup2(ends[1], STDOUT_FILENO);
+    ::execl(program.c_str(), program.c_str(), "report", series.c_str(), "--out", out.c_str(), nullptr);
+    ::_exit(127);
+  }
+  int status = 0;
+  bool ended = false;
+  const auto has_ended = [&] { return ended = ended || ::waitpid(child, &status, WNOHANG) == child; };
+  EXPECT_TRUE(test::wait_until([&] { return fs::exists(out) || has_ended(); }, 60s));
+  EXPECT_TRUE(test::wait_until(
+      [&] {
+        if (!ended) ::kill(child, SIGTERM);
+        return has_ended();
+      },
+      60s));
+  ::close(ends[0]), ::close(ends[1]);
+  EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 0) << status;
+  EXPECT_TRUE(fs::exists(folder_ / "report" / "report.json"));
 }
 
 TEST_F(Program, ImportsThePhantomsDicomSeries) {
