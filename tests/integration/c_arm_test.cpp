@@ -231,6 +231,13 @@ TEST_F(CArmTest, ShowsAHoleCountsItsShotsAndKeepsThem) {
   expect_kept(session);
 }
 
+// A window of 1400 pixels has room for the panel beside the others, also where letters are a fifth wider than here.
+TEST_F(CArmTest, ThePanelFitsIntoAUsualWindow) {
+  open();
+  show_panel();
+  EXPECT_LE(window_->minimumSizeHint().width(), 1400.0 / 1.2);
+}
+
 TEST_F(CArmTest, ShootsOnlyWhileItIsWantedAndLosesNothing) {
   const fs::path session = desk_->temp() / "wrong-use";
   open(session);

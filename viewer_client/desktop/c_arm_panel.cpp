@@ -177,8 +177,8 @@ CArmPanel::~CArmPanel() {
 
 QLayout* CArmPanel::make_screens() {
   auto* screens = new QHBoxLayout;
-  last_ = new CArmScreen(tr("The last picture"), "c_arm_last", 200);
-  before_ = new CArmScreen(tr("The picture before it"), "c_arm_before", 100);
+  last_ = new CArmScreen(tr("The last picture"), "c_arm_last", 140);
+  before_ = new CArmScreen(tr("The picture before it"), "c_arm_before", 70);
   screens->addWidget(last_, 2);
   screens->addWidget(before_, 1);
   return screens;
@@ -201,8 +201,6 @@ QLayout* CArmPanel::make_pedals() {
     connect(held, &QPushButton::pressed, this, [this, mode = mode] { press(mode); });
     connect(held, &QPushButton::released, this, [this] { release(); });
   }
-  save_ = button(tr("Save…"), "c_arm_save", tr("Saves the picture that is shown as a PNG file"));
-  connect(save_, &QPushButton::clicked, this, [this] { choose_file(); });
   return pedals;
 }
 
@@ -241,7 +239,14 @@ QLayout* CArmPanel::make_views() {
   kind_->addItem(tr("X-ray"));
   kind_->addItem(tr("Maximum intensity"));
   connect(kind_, QOverload<int>::of(&QComboBox::currentIndexChanged), this, [this] { show_maximum(); });
-  all->addWidget(kind_);
+  save_ = new QPushButton(tr("Save…"));
+  save_->setObjectName("c_arm_save");
+  save_->setToolTip(tr("Saves the picture that is shown as a PNG file"));
+  connect(save_, &QPushButton::clicked, this, [this] { choose_file(); });
+  auto* picture = new QHBoxLayout;  // beside the pedals it would make the panel wider than others are
+  picture->addWidget(kind_, 1);
+  picture->addWidget(save_);
+  all->addLayout(picture);
   all->addLayout(views);
   all->addLayout(centres);
   return all;
