@@ -19,6 +19,7 @@
 #include <cstdlib>
 #include <memory>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "tests/integration/imaging_bench.hpp"
@@ -369,6 +370,42 @@ TEST_F(ImagingSolidTestAlone, ACutEndOfABoneChoosesItsLastVoxel) {
   QTest::keyClick(&solid_->view(), Qt::Key_Return);
   ASSERT_TRUE(chosen_);
   EXPECT_EQ((*chosen_)[1], 20);
+}
+
+// A colour over another one is a * front + (1 - a) * back, whichever was added first.
+TEST_F(ImagingSolidTestAlone, TheNearerOfTwoTranslucentBonesCoversTheOther) {
+  using Colour = std::array<std::uint8_t, 3>;
+  constexpr double kOpacity = 0.6;
+  // Across the line of sight from the patient's front, which is -y.
+  const auto sheet = [](float y) {
+    constexpr float kFar = 200;
+    Mesh mesh;
+    mesh.positions_mm = {{-kFar, y, -kFar}, {kFar, y, -kFar}, {kFar, y, kFar}, {-kFar, y, kFar}};
+    mesh.normals.assign(4, {0, -1, 0});
+    mesh.triangles = {{0, 1, 2}, {0, 2, 3}};
+    return mesh;
+  };
+  SolidScene& scene = solid_->view().scene();
+  const auto seen = [&](std::vector<std::pair<int, float>> sheets) {
+    scene.bones().clear();
+    for (const auto& [bone, y] : sheets) scene.bones().show(bone, sheet(y));
+    scene.bones().set_paint(1, {220, 40, 40}, kOpacity);
+    scene.bones().set_paint(2, {40, 60, 220}, kOpacity);
+    solid_->view().makeCurrent();
+    scene.draw(false);
+    const Image image = scene.image();
+    return image.at(image.width_px / 2 + 37, image.height_px / 2 - 43);  // beside the crosshair
+  };
+  constexpr float kNear = -15, kFarther = -5;
+  const Colour nothing = seen({});
+  for (const auto& [near, far] : {std::pair(1, 2), std::pair(2, 1)}) {
+    const Colour near_alone = seen({{near, kNear}}), far_alone = seen({{far, kFarther}});
+    ASSERT_NE(near_alone, nothing);
+    for (const Colour& both : {seen({{near, kNear}, {far, kFarther}}), seen({{far, kFarther}, {near, kNear}})})
+      for (std::size_t c = 0; c < 3; ++c)
+        EXPECT_NEAR(both[c], near_alone[c] + (1.0 - kOpacity) * (far_alone[c] - nothing[c]), 4.0)
+            << near << " before " << far << ", channel " << c;
+  }
 }
 
 TEST_F(ImagingSolidTestAlone, AnEditBeforeAnotherThresholdIsNotLost) {

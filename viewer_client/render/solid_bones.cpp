@@ -9,12 +9,17 @@
 #include <vtkRenderer.h>
 #include <vtkSmartPointer.h>
 
+#include <algorithm>
 #include <map>
 #include <vector>
 
 #include "viewer_client/render/actors.hpp"
 
 namespace osteon {
+
+namespace {
+constexpr int kMostPeels = 4;  // each takes the nearest and the farthest layer; what is left between is mixed
+}  // namespace
 
 struct SolidBones::Impl {
   struct Paint {
@@ -33,16 +38,30 @@ struct SolidBones::Impl {
     property->SetColor(colour[0] / 255.0, colour[1] / 255.0, colour[2] / 255.0);
     property->SetOpacity(opacity);
     found->second->SetVisibility(opacity > 0.0 ? 1 : 0);
+    follow_translucent();
+  }
+
+  // Where translucent bones lie behind each other, VTK's usual pass mixes them as if they were at one place. Peeling
+  // takes them by their distance, and draws them several times. One alone hides its back, so it needs no order.
+  void follow_translucent() {
+    const auto count = std::ranges::count_if(surfaces, [](const auto& of) {
+      return of.second->GetVisibility() != 0 && of.second->GetProperty()->GetOpacity() < 1.0;
+    });
+    renderer.SetUseDepthPeeling(count > 1 ? 1 : 0);
   }
 };
 
-SolidBones::SolidBones(vtkRenderer& renderer) : impl_(new Impl{renderer, {}, {}}) {}
+SolidBones::SolidBones(vtkRenderer& renderer) : impl_(new Impl{renderer, {}, {}}) {
+  renderer.SetMaximumNumberOfPeels(kMostPeels);
+  renderer.SetOcclusionRatio(0.0);
+}
 
 SolidBones::~SolidBones() = default;
 
 void SolidBones::clear() {
   for (const auto& [bone, actor] : impl_->surfaces) impl_->renderer.RemoveActor(actor);
   impl_->surfaces.clear();
+  impl_->follow_translucent();
 }
 
 void SolidBones::show(int bone, const Mesh& mesh) {
