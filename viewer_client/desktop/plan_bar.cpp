@@ -80,7 +80,7 @@ void PlanBar::fill(QMenu& menu, const Add& add) {
   changes_ = {draw_axis, draw_plane, point, name, wipes, undoes};
   menu.addSeparator();
   action(tr("&Save the plan…"), "save_plan", "Ctrl+Shift+E",
-         tr("The axes as a file with which a simulated surgeon drills them"), [this] { choose_file(); });
+         tr("The axes and planes as a file; a simulated surgeon drills its axes"), [this] { choose_file(); });
   static_cast<QHBoxLayout*>(layout())->addStretch();
 }
 
@@ -229,9 +229,7 @@ std::optional<std::pair<PlanOffset, QString>> PlanBar::offset_of(const CuttingSt
 }
 
 void PlanBar::choose_file() {
-  const std::vector<Annotation> planned = plan_.planned();
-  if (std::ranges::find(planned, AnnotationKind::axis, &Annotation::kind) == planned.end())
-    return window_.say(tr("Draw an axis first: a simulated surgeon drills axes."));
+  if (plan_.planned().empty()) return window_.say(tr("Draw an axis or a plane first."));
   QFileDialog dialog(this, tr("Save the plan"), {}, tr("Plans (*.json)"));
   dialog.setAcceptMode(QFileDialog::AcceptSave);
   dialog.setDefaultSuffix("json");
@@ -254,11 +252,11 @@ std::string PlanBar::drill() const {
 
 void PlanBar::save(const QString& file) const {
   const Result<void> saved = write_file(file.toStdString(), plan_text(plan_.planned(), drill()));
-  if (!saved) return window_.say(QString::fromStdString(saved.error().message));
-  // A plan has the steps of a simulated surgeon, and a plane is none.
-  const bool all =
-      std::ranges::none_of(plan_.planned(), [](const Annotation& one) { return one.kind != AnnotationKind::axis; });
-  window_.say(all ? tr("Saved %1.").arg(file) : tr("Saved the axes to %1. Planes stay in the room.").arg(file));
+  const bool drills =
+      std::ranges::any_of(plan_.planned(), [](const Annotation& one) { return one.kind == AnnotationKind::axis; });
+  window_.say(saved && drills ? tr("Saved %1.").arg(file)
+              : saved         ? tr("Saved %1. It has no axis that a simulated surgeon could drill.").arg(file)
+                              : QString::fromStdString(saved.error().message));
 }
 
 }  // namespace osteon

@@ -206,16 +206,21 @@ Result<std::uint32_t> carry_out(const DrawnPlan::Change& change, std::span<const
 }
 
 std::string plan_text(std::span<const Annotation> planned, const std::string& tool) {
-  nlohmann::json steps = nlohmann::json::array();
+  nlohmann::json steps = nlohmann::json::array(), planes = steps;
   const auto numbers = [](const Vec3& v) { return nlohmann::json{v.x(), v.y(), v.z()}; };
   for (const Annotation& one : planned) {
-    if (one.kind != AnnotationKind::axis) continue;
     const std::vector<Vec3> points = points_mm(one);
+    if (one.kind == AnnotationKind::plane)
+      planes.push_back({{"name", one.words},
+                        {"point_mm", numbers(points[0])},
+                        {"end_mm", numbers(points[1])},
+                        {"normal", numbers(planned_direction(one))}});
+    if (one.kind != AnnotationKind::axis) continue;
     steps.push_back({{"action", "drill"},
                      {"tool", tool},
                      {"entry", {{"point_mm", numbers(points[0])}, {"target_mm", numbers(points[1])}}}});
   }
-  return nlohmann::json{{"steps", steps}}.dump(2) + "\n";
+  return nlohmann::json{{"steps", steps}, {"planes", planes}}.dump(2) + "\n";
 }
 
 }  // namespace osteon

@@ -92,8 +92,8 @@ struct PlanRequests {
 [[nodiscard]] Result<std::uint32_t> carry_out(const DrawnPlan::Change& change, std::span<const Annotation> now,
                                               AuthorId self, const PlanRequests& room);
 
-// The axes among them as a plan of a simulated surgeon, JSON: it drills one after the other with this tool, each to its
-// target.
+// A plan of a simulated surgeon, JSON: it drills the axes one after the other with this tool, each to its target. The
+// planes are in it for people and other programs. LPS, mm.
 [[nodiscard]] std::string plan_text(std::span<const Annotation> planned, const std::string& tool);
 
 }  // namespace osteon

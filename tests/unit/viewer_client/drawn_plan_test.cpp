@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <nlohmann/json.hpp>
 
 namespace osteon {
@@ -229,8 +230,18 @@ TEST_F(Planning, AxesAreStepsOfASimulatedSurgeon) {
   draw(AnnotationKind::axis, {1, 2, 0}, {1, 2.5, -20});
   draw(AnnotationKind::plane, {0, 0, 0}, {10, 0, 0});
   const auto plan = nlohmann::json::parse(plan_text(plan_.planned(), "drill-3.5"));
-  EXPECT_EQ(plan, nlohmann::json::parse(R"({"steps": [{"action": "drill", "tool": "drill-3.5",
-    "entry": {"point_mm": [1.0, 2.0, 0.0], "target_mm": [1.0, 2.5, -20.0]}}]})"));
+  EXPECT_EQ(plan.at("steps"), nlohmann::json::parse(R"([{"action": "drill", "tool": "drill-3.5",
+    "entry": {"point_mm": [1.0, 2.0, 0.0], "target_mm": [1.0, 2.5, -20.0]}}])"));
+  // Its line goes along x and its depth along z, so it is across y.
+  const auto& planes = plan.at("planes");
+  ASSERT_EQ(planes.size(), 1u);
+  EXPECT_EQ(planes[0].at("name"), "one");
+  EXPECT_EQ(planes[0].at("point_mm"), (std::vector<double>{0.0, 0.0, 0.0}));
+  EXPECT_EQ(planes[0].at("end_mm"), (std::vector<double>{10.0, 0.0, 0.0}));
+  const auto normal = planes[0].at("normal").get<std::vector<double>>();
+  EXPECT_NEAR(normal.at(0), 0.0, 1e-9);
+  EXPECT_NEAR(std::abs(normal.at(1)), 1.0, 1e-9);
+  EXPECT_NEAR(normal.at(2), 0.0, 1e-9);
 }
 
 }  // namespace

@@ -2239,10 +2239,6 @@
         <translation>Planung &amp;speichern…</translation>
     </message>
     <message>
-        <source>The axes as a file with which a simulated surgeon drills them</source>
-        <translation>Die Achsen als Datei, mit der ein simulierter Chirurg sie bohrt</translation>
-    </message>
-    <message>
         <source>Click the entry, on the bone or on a slice.</source>
         <translation>Klicken Sie den Eintritt an, auf dem Knochen oder einem Schnitt.</translation>
     </message>
@@ -2303,10 +2299,6 @@
         <translation>Ebene %1</translation>
     </message>
     <message>
-        <source>Draw an axis first: a simulated surgeon drills axes.</source>
-        <translation>Zeichnen Sie zuerst eine Achse: Ein simulierter Chirurg bohrt Achsen.</translation>
-    </message>
-    <message>
         <source>Save the plan</source>
         <translation>Planung speichern</translation>
     </message>
@@ -2327,8 +2319,16 @@
         <translation>Umbenennen…</translation>
     </message>
     <message>
-        <source>Saved the axes to %1. Planes stay in the room.</source>
-        <translation>Die Achsen sind in %1 gespeichert. Ebenen bleiben im Raum.</translation>
+        <source>The axes and planes as a file; a simulated surgeon drills its axes</source>
+        <translation>Die Achsen und Ebenen als Datei; ein simulierter Chirurg bohrt ihre Achsen</translation>
+    </message>
+    <message>
+        <source>Draw an axis or a plane first.</source>
+        <translation>Zeichnen Sie zuerst eine Achse oder Ebene.</translation>
+    </message>
+    <message>
+        <source>Saved %1. It has no axis that a simulated surgeon could drill.</source>
+        <translation>%1 ist gespeichert. Für einen simulierten Chirurgen fehlt eine Achse.</translation>
     </message>
 </context>
 <context>
