@@ -2,13 +2,16 @@
 // that osteon-import makes of the same edit list.
 #include <gtest/gtest.h>
 
+#include <QAbstractButton>
 #include <QApplication>
 #include <QComboBox>
 #include <QCoreApplication>
 #include <QDockWidget>
 #include <QFileDialog>
 #include <QLabel>
+#include <QLineEdit>
 #include <QListWidget>
+#include <QMessageBox>
 #include <QPushButton>
 #include <QSettings>
 #include <QSlider>
@@ -21,6 +24,7 @@
 #include <filesystem>
 #include <set>
 #include <string>
+#include <utility>
 
 #include "common/volume/case.hpp"
 #include "tests/integration/imaging_bench.hpp"
@@ -145,6 +149,47 @@ TEST_F(ImagingTest, FromAFolderToADrillableBoneInTenClicks) {
   ASSERT_TRUE(repeated) << repeated.error().message;
   EXPECT_EQ(repeated->hash(), bone->hash());
   drill();
+}
+
+// Answers the question for folder or file, and then chooses in the dialog. What it cannot answer it closes.
+class SourceChooser : public QObject {
+ public:
+  SourceChooser(const char* kind, QString file) : kind_(kind), file_(std::move(file)) {
+    connect(&timer_, &QTimer::timeout, this, [this] {
+      QWidget* modal = QApplication::activeModalWidget();
+      if (auto* box = qobject_cast<QMessageBox*>(modal)) {
+        for (QAbstractButton* button : box->buttons())
+          if (button->text().remove('&').contains(kind_)) return button->click();
+        box->reject();
+      } else if (auto* dialog = qobject_cast<QFileDialog*>(modal)) {
+        if (file_.isEmpty()) return dialog->reject();
+        dialog->findChild<QLineEdit*>("fileNameEdit")->setText(std::exchange(file_, {}));
+        QMetaObject::invokeMethod(dialog, "accept", Qt::QueuedConnection);
+      }
+    });
+    timer_.start(20);
+  }
+
+ private:
+  QString kind_, file_;
+  QTimer timer_;
+};
+
+TEST_F(ImagingTest, BesideABoneImportTakesAFileToo) {
+  const fs::path slice = *fs::directory_iterator(series("ct", two_balls()));
+  open();
+  {
+    const SourceChooser nothing("Cancel", {});
+    trigger("import_scan");
+  }
+  EXPECT_TRUE(view_->isVisible()) << "nobody leaves a room before a scan is chosen";
+  {
+    const SourceChooser a_file("file", QString::fromStdString(slice.string()));
+    trigger("import_scan");
+  }
+  auto& list = part<QListWidget>("series");
+  ASSERT_TRUE(until([&] { return list.isVisible() && list.count() == 1; })) << words();
+  EXPECT_FALSE(view_->isVisible());
 }
 
 TEST_F(ImagingTest, ThePlanesHangTogether) {

@@ -11,6 +11,7 @@
 #include <QLabel>
 #include <QListWidget>
 #include <QLocale>
+#include <QMessageBox>
 #include <QProgressBar>
 #include <QPushButton>
 #include <QScrollArea>
@@ -319,13 +320,28 @@ void ImagingPage::choose_folder() {
   if (!folder.isEmpty()) open_source(folder);
 }
 
-void ImagingPage::choose_file() {
+QString ImagingPage::ask_for_file(QWidget* parent) {
   QSettings settings;
   const QString file =
-      QFileDialog::getOpenFileName(this, tr("The file of a CT"), settings.value(kLastFolderKey).toString());
-  if (file.isEmpty()) return;
-  settings.setValue(kLastFolderKey, QFileInfo(file).path());
-  open_source(file);
+      QFileDialog::getOpenFileName(parent, tr("The file of a CT"), settings.value(kLastFolderKey).toString());
+  if (!file.isEmpty()) settings.setValue(kLastFolderKey, QFileInfo(file).path());
+  return file;
+}
+
+void ImagingPage::choose_file() {
+  const QString file = ask_for_file(this);
+  if (!file.isEmpty()) open_source(file);
+}
+
+QString ImagingPage::ask_for_source(QWidget* parent) {
+  QMessageBox box(QMessageBox::Question, tr("Import a CT"), tr("Is the CT a folder or a file?"), QMessageBox::Cancel,
+                  parent);
+  box.setInformativeText(tr("A file is a zip or ISO image, NIfTI, NRRD or MetaImage."));
+  const auto* folder = box.addButton(tr("Open a fol&der…"), QMessageBox::AcceptRole);
+  const auto* file = box.addButton(tr("Open a f&ile…"), QMessageBox::AcceptRole);
+  box.exec();
+  if (box.clickedButton() == folder) return ask_for_folder(parent);
+  return box.clickedButton() == file ? ask_for_file(parent) : QString();
 }
 
 void ImagingPage::open_source(const QString& source) {

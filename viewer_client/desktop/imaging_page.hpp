@@ -53,8 +53,8 @@ class ImagingPage : public QWidget {
   // The scene goes before the widgets that show it.
   ~ImagingPage() override { release_scene(); }
 
-  // Asks for a folder, beside the last one. Empty: none was chosen.
-  static QString ask_for_folder(QWidget* parent);
+  // Asks whether the scan is a folder or a file, and then for it, beside the last one. Empty: none was chosen.
+  static QString ask_for_source(QWidget* parent);
   // A folder, zip, ISO image or file. What is open goes.
   void open_source(const QString& source);
   [[nodiscard]] bool has_scan() const { return scene_.open(); }
@@ -83,6 +83,8 @@ class ImagingPage : public QWidget {
   QPushButton* add_button(QBoxLayout& to, const QString& words, const char* name, const QString& tip,
                           std::function<void()> call);
 
+  static QString ask_for_folder(QWidget* parent);
+  static QString ask_for_file(QWidget* parent);
   void choose_folder();
   void choose_file();
   void show_work(const QString& what);

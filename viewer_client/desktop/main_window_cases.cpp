@@ -110,8 +110,8 @@ void MainWindow::choose_scan() {
   if (practice_ && imaging_->has_scan()) leave_room();  // it is kept, and the start page goes on with it
   if (!practice_ && !room_) return pages_->setCurrentWidget(imaging_);
   // Nobody leaves a room before a scan is chosen.
-  const QString folder = ImagingPage::ask_for_folder(this);
-  if (!folder.isEmpty()) process_images(folder);
+  const QString source = ImagingPage::ask_for_source(this);
+  if (!source.isEmpty()) process_images(source);
 }
 
 void MainWindow::process_images(const QString& source) {

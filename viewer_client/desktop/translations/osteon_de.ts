@@ -1209,7 +1209,7 @@
         <translation>Kan&amp;ten</translation>
     </message>
     <message>
-        <source>Lines where the HU change most, by Canny&apos;s method</source>
+        <source>Lines where the HU change most, by Canny's method</source>
         <translation>Linien, wo sich die HU am meisten ändern, mit Cannys Verfahren</translation>
     </message>
     <message>
@@ -1267,6 +1267,18 @@
     <message>
         <source>The case of the bone is removed again. The edits are still here.</source>
         <translation>Der Fall des Knochens ist wieder gelöscht. Ihre Bearbeitungen sind noch da.</translation>
+    </message>
+    <message>
+        <source>Import a CT</source>
+        <translation>CT importieren</translation>
+    </message>
+    <message>
+        <source>Is the CT a folder or a file?</source>
+        <translation>Ist das CT ein Ordner oder eine Datei?</translation>
+    </message>
+    <message>
+        <source>A file is a zip or ISO image, NIfTI, NRRD or MetaImage.</source>
+        <translation>Eine Datei ist ein Zip- oder ISO-Abbild, NIfTI, NRRD oder MetaImage.</translation>
     </message>
 </context>
 <context>
