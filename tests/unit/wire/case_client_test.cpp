@@ -35,6 +35,7 @@ class FakeCases final : public v1::CaseService::Service {
  public:
   grpc::Status UploadCase(grpc::ServerContext* context, grpc::ServerReader<v1::UploadCaseRequest>* reader,
                           v1::UploadCaseResponse* response) override {
+    begun = true;
     if (!refusal.ok()) return refusal;
     v1::UploadCaseRequest request;
     while (reader->Read(&request)) received += request.data();
@@ -53,7 +54,7 @@ class FakeCases final : public v1::CaseService::Service {
 
   grpc::Status refusal;
   std::string received;
-  std::atomic<bool> holds{false}, has_all{false}, was_cancelled{false};
+  std::atomic<bool> begun{false}, holds{false}, has_all{false}, was_cancelled{false};
 };
 
 class FakeRooms final : public v1::RoomsService::Service {
@@ -142,7 +143,11 @@ TEST_F(CaseClientTest, AStopEndsTheCallWhileTheServerChecks) {
 }
 
 TEST_F(CaseClientTest, AStopInTheMiddleSendsNoEndOfTheData) {
-  const auto stored = upload_case(channel_, archive_, [](double fraction) { return fraction < 0.5; });
+  // A busy server drops a call that is cancelled before it has begun.
+  const auto stored = upload_case(channel_, archive_, [&](double done) {
+    for (int i = 0; done >= 0.5 && !cases_.begun && i < kPatience_ms; ++i) std::this_thread::sleep_for(1ms);
+    return done < 0.5;
+  });
   ASSERT_FALSE(stored);
   EXPECT_EQ(stored.error().code, ErrorCode::cancelled);
   server_->Shutdown();
