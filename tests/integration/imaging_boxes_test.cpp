@@ -118,6 +118,18 @@ class ImagingBoxesTest : public test::ImagingBench {
     const test::FolderChooser chooser(QString::fromStdString(to.string()));
     QTest::mouseClick(&part<QPushButton>("write_sub_volumes"), Qt::LeftButton);
   }
+  // The one that writes. 0: there is none in time.
+  [[nodiscard]] static pid_t wait_for_importer() {
+    std::vector<pid_t> importers;
+    const bool in_time = test::wait_until(
+        [&] {
+          QCoreApplication::processEvents();
+          importers = test::children("osteon-import");
+          return !importers.empty();
+        },
+        30s);
+    return in_time ? importers.front() : 0;
+  }
   void keep_picture(const char* name) const {
     const char* folder = std::getenv("OSTEON_TEST_PICTURES");
     if (folder == nullptr) return;
@@ -232,16 +244,10 @@ TEST_F(ImagingBoxesTest, AKilledImporterLeavesNoPartOfTheFiles) {
   const fs::path to = desk_->temp() / "killed";
   fs::create_directories(to);
   write(to);
-  std::vector<pid_t> importers;
-  ASSERT_TRUE(test::wait_until(
-      [&] {
-        QCoreApplication::processEvents();
-        importers = test::children("osteon-import");
-        return !importers.empty();
-      },
-      30s));
-  ASSERT_EQ(::kill(importers.front(), SIGSTOP), 0);
-  fs::create_directories(to / ("sub-volumes.partial-" + std::to_string(importers.front())));
+  const pid_t importer = wait_for_importer();
+  ASSERT_NE(importer, 0);
+  ASSERT_EQ(::kill(importer, SIGSTOP), 0);
+  fs::create_directories(to / ("sub-volumes.partial-" + std::to_string(importer)));
   fs::create_directories(to / ("sub-volumes.partial-" + std::to_string(::getpid())));
   window_.reset();
   EXPECT_EQ(test::names_in(to), (std::set<std::string>{"sub-volumes.partial-" + std::to_string(::getpid())}))
@@ -253,15 +259,9 @@ TEST_F(ImagingBoxesTest, TheFilesAreThoseOfTheImporter) {
   fs::create_directories(to);
   // Cancelled after osteon-import has ended, and before the window knows it.
   write(to);
-  std::vector<pid_t> importers;
-  ASSERT_TRUE(test::wait_until(
-      [&] {
-        QCoreApplication::processEvents();
-        importers = test::children("osteon-import");
-        return !importers.empty();
-      },
-      30s));
-  const std::string program = "/proc/" + std::to_string(importers.front()) + "/exe";  // goes when the process ends
+  const pid_t importer = wait_for_importer();
+  ASSERT_NE(importer, 0);
+  const std::string program = "/proc/" + std::to_string(importer) + "/exe";  // goes when the process ends
   std::error_code ignored;
   ASSERT_TRUE(test::wait_until([&] { return !fs::exists(program, ignored); }, 60s));
   EXPECT_TRUE(fs::exists(to / "sub-volumes"));

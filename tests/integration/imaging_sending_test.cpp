@@ -179,6 +179,7 @@ TEST_F(ImagingSendingTest, OneCaseIsSentAndOpened) {
   // Other cases have the title of the scan, too.
   const QString title = recent_entries().front().title.section('\n', 0, 0);
   EXPECT_EQ(title.toStdString(), "CT (" + made.filename().string() + ")");
+  EXPECT_EQ(case_title(made), "CT") << "a file that leaves this computer is called so";
 
   // The page and its edits are there beside the open bone. Another edit is another case.
   trigger("import_scan");

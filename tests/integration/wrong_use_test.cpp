@@ -512,7 +512,8 @@ TEST_F(WrongUse, AnImportIsNeverTakenForAnExample) {
   // An older window has imported a scan into it.
   fs::create_directories(before);
   put_bytes(before / "case.json", R"({"title": "Right leg", "source": "DICOM CT, 9 slices"})");
-  EXPECT_EQ(case_title(before), "Right leg (tibia)");
+  EXPECT_EQ(case_title(before), "Right leg");
+  EXPECT_EQ(case_on_screen(before), "Right leg (tibia)");
   EXPECT_FALSE(can_be_made_again(before)) << "its scan may be gone";
   const fs::path now = example_folder(*tibia);
   EXPECT_NE(now, before);
@@ -520,6 +521,7 @@ TEST_F(WrongUse, AnImportIsNeverTakenForAnExample) {
   EXPECT_NE(new_case_folder("/scans/tibia-example"), now);
   put_bytes(before / "case.json", R"({"title": "A bone", "source": "parametric phantom, tibia"})");
   EXPECT_EQ(case_title(before), "Tibia, a phantom");
+  EXPECT_EQ(case_on_screen(before), "Tibia, a phantom");
   fs::remove_all(before);
 }
 
@@ -534,11 +536,14 @@ TEST_F(WrongUse, WhatWasLeftBehindGoesWhenTheOnlyWindowCloses) {
                                    "notes.log",
                                    std::string(63, 'c'),
                                    "sent",
-                                   "sent.unsent-" + alive},
+                                   "sent.unsent-" + alive,
+                                   "scan.unsent-" + dead,
+                                   ".unsent-" + dead},
       go{unneeded, "femur.partial-" + dead, "unpack-" + dead + ".log", "unsent", "unsent.unsent-" + dead};
   fs::create_directories(cases);
   const auto put = [&](const std::string& name) {
-    if (name.ends_with(".log")) return put_bytes(cases / name, "words");
+    const bool marks = name.find(".unsent-") != std::string::npos && !name.starts_with("scan");  // a case's own name
+    if (name.ends_with(".log") || marks) return put_bytes(cases / name, "words");
     fs::create_directories(cases / name);
     fs::copy_file(desk_->bone() / "case.json", cases / name / "case.json");
   };

@@ -18,7 +18,6 @@
 #include "common/subvolumes/quadtree.hpp"
 #include "viewer_client/desktop/enabled.hpp"
 #include "viewer_client/desktop/library.hpp"
-#include "viewer_client/desktop/page_fields.hpp"
 
 namespace osteon {
 
@@ -107,7 +106,6 @@ ImagingBoxes::ImagingBoxes(const ImagingScene& scene, Events events, QWidget* pa
   all->addLayout(make_work());
   all->addWidget(buttons);
   resize(kFirstSize);
-  leave_keys_and_wheel(*this);
   pause_.setSingleShot(true);
   pause_.setInterval(kBoxesPause_ms);
   connect(&pause_, &QTimer::timeout, this, [this] { ask(); });

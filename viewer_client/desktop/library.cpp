@@ -146,11 +146,15 @@ QString case_title(const std::filesystem::path& bone) {
   for (const ExampleBone& example : example_bones())
     if (bone == example_folder(example)) return example.title;
   const QString title = text_in_case(bone, "title");
-  QString folder = text_of(bone.filename());
-  if (title.isEmpty()) return folder;
-  // Most scans have the title "CT", but each a folder of its own.
-  const bool made_here = bone.parent_path() == cases_folder() && !is_name_of_unpacked(bone.filename().string());
-  return made_here && title != folder ? QString("%1 (%2)").arg(title, folder) : title;
+  return title.isEmpty() ? text_of(bone.filename()) : title;
+}
+
+// Most scans have the title "CT", but each a folder of its own.
+QString case_on_screen(const std::filesystem::path& bone) {
+  QString title = case_title(bone);
+  const bool of_scan = bone.parent_path() == cases_folder() && !can_be_made_again(bone);
+  const QString folder = text_of(bone.filename());
+  return of_scan && title != folder ? QString("%1 (%2)").arg(title, folder) : title;
 }
 
 namespace {
@@ -178,7 +182,7 @@ std::vector<RecentEntry> recent_entries() {
   for (RecentEntry& entry : entries)
     if (entry.opened.isValid())
       // In one line, the list would cut off the time.
-      entry.title = (entry.name.isEmpty() ? case_title(entry.bone) : entry.name) + '\n' +
+      entry.title = (entry.name.isEmpty() ? case_on_screen(entry.bone) : entry.name) + '\n' +
                     QLocale().toString(entry.opened, QLocale::ShortFormat);
   return entries;
 }

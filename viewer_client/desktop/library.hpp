@@ -60,9 +60,11 @@ void remove_unused_case(const std::filesystem::path& bone);
 [[nodiscard]] bool is_name_of_unpacked(std::string_view name);
 // The window has made the case by itself, of an example or of a case file, and can do so again.
 [[nodiscard]] bool can_be_made_again(const std::filesystem::path& bone);
-// The title of a case, and the name of its folder if this window's user made it of a scan; of a case without a title
-// that name alone. The title of an example is translated.
+// The title of a case, or the name of its folder. That of an example is translated.
 [[nodiscard]] QString case_title(const std::filesystem::path& bone);
+// To tell cases apart on this screen: the title, and the name of the folder if this window has made the case of a scan.
+// A scan's folder may have a patient's name, so no file and no server gets this text.
+[[nodiscard]] QString case_on_screen(const std::filesystem::path& bone);
 [[nodiscard]] bool is_case(const std::filesystem::path& folder);
 [[nodiscard]] bool is_file(const std::filesystem::path& path);  // a plain one
 

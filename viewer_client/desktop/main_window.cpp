@@ -326,7 +326,7 @@ void MainWindow::practise(const std::filesystem::path& bone, const std::filesyst
   options.sound_socket = socket_path(sockets_, "sound");
   if (const auto sound = sound_control_->listen(options.sound_socket); !sound)
     return room_ended(QString::fromStdString(sound.error().message));
-  const QString title = name.isEmpty() ? case_title(bone) : name;
+  const QString title = name.isEmpty() ? case_on_screen(bone) : name;
   opened_ = RecentEntry{title, bone, options.folder, name, QDateTime::currentDateTime()};
   if (!session.empty())
     for (const RecentEntry& entry : recent_entries())

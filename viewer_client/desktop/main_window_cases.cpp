@@ -186,7 +186,7 @@ void MainWindow::send_case(const std::filesystem::path& what) {
   if (sends_already()) return;
   // A new dialog would take the place of that one, which removes a case that is not sent when it goes.
   if (sender_ && sender_->isVisible() && sender_->holds(what)) return raise_sender();
-  open_send_dialog(what, is_file(what) ? text_of(what.filename()) : case_title(what), true);
+  open_send_dialog(what, is_file(what) ? text_of(what.filename()) : case_on_screen(what), true);
 }
 
 QString MainWindow::send_made_case(const std::filesystem::path& bone) {
@@ -197,7 +197,7 @@ QString MainWindow::send_made_case(const std::filesystem::path& bone) {
     return next;
   }
   if (!sender_ || !sender_->isVisible() || !sender_->holds(bone)) {
-    open_send_dialog(bone, case_title(bone), false);
+    open_send_dialog(bone, case_on_screen(bone), false);
     connect(sender_.get(), &QDialog::finished, this, [this] { imaging_->check_made(); });
   }
   raise_sender();

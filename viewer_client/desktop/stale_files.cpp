@@ -66,10 +66,13 @@ void StaleFiles::remove() {
     // Without any session the settings may be lost, and not the sessions.
     return is_name_of_unpacked(name) && !needed.empty() && !needed.contains(name);
   });
+  // A case may have such a name too. Only a mark is a file, and it begins with the name of its case.
   remove_from(cases_folder(), [](const std::filesystem::directory_entry& entry) {
+    std::error_code ignored;
     const std::string name = entry.path().filename().string();
-    const std::size_t mark = name.find(kUnsentMark);
-    if (mark == std::string::npos || !ends_with_a_dead_program(name)) return false;
+    const std::size_t mark = name.rfind(kUnsentMark);
+    if (mark == std::string::npos || mark == 0 || !entry.is_regular_file(ignored)) return false;
+    if (!ends_with_a_dead_program(name)) return false;
     remove_unused_case(cases_folder() / name.substr(0, mark));
     return true;
   });
